@@ -1,0 +1,124 @@
+"""Kernels of the cells: volumes of the tetrahedra, wedges and hexahedra, and of the solid within them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from porefv.facets import (
+    _cross,
+    _dot,
+    _height,
+    _plane_distance,
+    _tangent,
+    _towards,
+    area_vector,
+    centroid,
+    spheres_first,
+)
+
+
+@njit(cache=True, parallel=True)
+def polyhedron_volumes(cells, n, points, sizes):
+    """Volume of each cell: its spheres' centres swept to its walls."""
+    volumes = np.empty(cells.shape[0])
+    for t in prange(cells.shape[0]):
+        s = np.empty(4, np.int32)  # spheres first
+        ns = 0
+        for i in range(4):
+            if cells[t, i] < n:
+                s[ns] = cells[t, i]
+                ns += 1
+        nw = ns
+        for i in range(4):
+            if cells[t, i] >= n:
+                s[nw] = cells[t, i]
+                nw += 1
+        if ns == 4:
+            u = _cross(_towards(s[0], s[1], n, points), _towards(s[0], s[2], n, points))
+            volumes[t] = abs(_dot(u, _towards(s[0], s[3], n, points))) / 6.0
+        elif ns == 3:
+            u = _cross(_towards(s[0], s[1], n, points), _towards(s[0], s[2], n, points))
+            base = 0.5 * abs(_dot(u, (points[s[3], 0], points[s[3], 1], points[s[3], 2])))
+            height = 0.0
+            for i in range(3):
+                height += _height(s[i], s[3], points, sizes)
+            volumes[t] = base * height / 3.0
+        elif ns == 2:
+            u = _towards(s[0], s[1], n, points)
+            d = _cross(_towards(s[0], s[2], n, points), _towards(s[0], s[3], n, points))
+            a0 = _height(s[0], s[2], points, sizes)
+            a1 = _height(s[1], s[2], points, sizes)
+            b0 = _height(s[0], s[3], points, sizes)
+            b1 = _height(s[1], s[3], points, sizes)
+            # Both widths vary linearly along the edge.
+            volumes[t] = abs(_dot(u, d)) * (2.0 * a0 * b0 + 2.0 * a1 * b1 + a0 * b1 + a1 * b0) / 6.0
+        else:
+            volumes[t] = 1.0
+            for i in range(1, 4):
+                volumes[t] *= _height(s[0], s[i], points, sizes)
+    return volumes
+
+
+@njit(cache=True, parallel=True)
+def cell_solids(cells, n, points, sizes):
+    """Volume of the balls, each cut by its Laguerre planes, within each cell."""
+    solids = np.zeros(cells.shape[0])
+    for t in prange(cells.shape[0]):
+        total = 0.0
+        for i in range(4):
+            k = cells[t, i]
+            if k >= n:
+                continue
+            u = _towards(k, cells[t, (i + 1) % 4], n, points)
+            v = _towards(k, cells[t, (i + 2) % 4], n, points)
+            w = _towards(k, cells[t, (i + 3) % 4], n, points)
+            numerator, denominator = _tangent(u, v, w)
+            r = sizes[k]
+            total += 2.0 * np.arctan2(abs(numerator), denominator) * r * r * r / 3.0
+            for j in range(3):
+                m = cells[t, (i + 1 + j) % 4]
+                edge = u if j == 0 else (v if j == 1 else w)
+                d = _plane_distance(k, m, edge, n, points, sizes)
+                if d >= r:
+                    continue
+                d = max(d, -r)
+                a = _cross(edge, v if j == 0 else (w if j == 1 else u))
+                b = _cross(edge, w if j == 0 else (u if j == 1 else v))
+                x = _cross(a, b)
+                psi = np.arctan2(np.sqrt(_dot(x, x)), _dot(a, b))
+                h = r - d
+                total -= psi * h * h * (3.0 * r - h) / 6.0
+        solids[t] = total
+    return solids
+
+
+@njit(cache=True)
+def enumerate_wall_faces(cells, n, points, sizes):
+    """Face of each cell on each of its walls: the facet opposite to the wall, projected on it."""
+    count = 0
+    for t in range(cells.shape[0]):
+        for i in range(4):
+            if cells[t, i] >= n:
+                count += 1
+    face_cells = np.empty(count, np.int32)
+    walls = np.empty(count, np.int32)
+    areas = np.empty(count)
+    centroids = np.empty((count, 3))
+    f = 0
+    for t in range(cells.shape[0]):
+        for i in range(4):
+            wall = cells[t, i]
+            if wall < n:
+                continue
+            a, b, c = spheres_first(cells[t, (i + 1) % 4], cells[t, (i + 2) % 4], cells[t, (i + 3) % 4], n)
+            direction = (points[wall, 0], points[wall, 1], points[wall, 2])
+            x = centroid(a, b, c, n, points, sizes)
+            gap = sizes[wall] - _dot(x, direction)
+            face_cells[f] = t
+            walls[f] = wall - n
+            areas[f] = abs(_dot(area_vector(a, b, c, n, points, sizes), direction))
+            for axis in range(3):
+                centroids[f, axis] = x[axis] + gap * direction[axis]
+            f += 1
+    return face_cells, walls, areas, centroids

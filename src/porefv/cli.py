@@ -1,0 +1,152 @@
+"""The command `porefv`: solve, check, info, plot. Commands import what they need: help comes at once."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from porefv.errors import PorefvError
+
+if TYPE_CHECKING:
+    from porefv.progress import Progress
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input) or 130 (interrupted)."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.command(options)
+        sys.stdout.flush()
+        return 0
+    except PorefvError as error:
+        return _fail(str(error), error.exit_status)
+    except KeyboardInterrupt:
+        return _fail("interrupted; nothing was written", 130)
+    except BrokenPipeError:
+        # Whoever read our output has gone (porefv info results | head): no complaint on the way out.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except ModuleNotFoundError as error:
+        return _fail(f"the installation is incomplete: {error}. Install porefv again with pip", 1)
+    except MemoryError:
+        return _fail("not enough memory; ask for less (quantities, vtk), or use a larger machine", 1)
+    except Exception as error:  # the user gets a line, the developer a traceback
+        if os.environ.get("POREFV_DEBUG"):
+            raise
+        return _fail(
+            f"unexpected {type(error).__name__}: {error}\nThis is a defect of porefv. Please report it, with "
+            "the scene and what the same command prints with POREFV_DEBUG=1 in the environment.",
+            1,
+        )
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"porefv: error: {message}", file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="porefv",
+        description="Flow through packings of spheres: permeability, pressures, forces on every grain.",
+        epilog="A scene says what is wanted, and only that is computed. "
+        "Exit status: 0 done, 1 the computation failed, 2 bad input.",
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    solve = commands.add_parser("solve", help="compute what a scene asks for, and write its results")
+    solve.add_argument("scene", metavar="SCENE.toml", type=Path)
+    solve.add_argument("--force", action="store_true", help="replace results that exist")
+    solve.add_argument("--threads", metavar="N", type=_count, help="compute with at most N threads")
+    solve.add_argument("--quiet", action="store_true", help="print errors only")
+    solve.set_defaults(command=_solve)
+
+    check = commands.add_parser("check", help="validate a scene and its packing without computing")
+    check.add_argument("scene", metavar="SCENE.toml", type=Path)
+    check.set_defaults(command=_check)
+
+    info = commands.add_parser("info", help="print a summary of results")
+    info.add_argument("results", metavar="RESULTS", type=Path)
+    info.set_defaults(command=_info)
+
+    plot = commands.add_parser("plot", help="draw results: grains coloured by force, pores by pressure")
+    plot.add_argument("results", metavar="RESULTS", type=Path)
+    plot.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
+    plot.set_defaults(command=_plot)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        parser.exit(message=f"porefv {version('porefv')}\n")
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"expected a number of threads, 1 or more, not '{text}'")
+    return int(text)
+
+
+# ---- commands ------------------------------------------------------------------------------------------
+
+
+def _solve(options: argparse.Namespace) -> None:
+    from porefv.progress import Progress
+    from porefv.report import outcome
+    from porefv.results import read
+    from porefv.scene import Scene
+
+    scene = Scene.read(options.scene)
+    if options.threads:
+        import numba
+
+        numba.set_num_threads(min(options.threads, numba.get_num_threads()))
+    progress = Progress(scene.stages, quiet=options.quiet)
+    _announce_compilation(progress)
+    directory = scene.solve(force=options.force, progress=progress)
+    if not options.quiet:
+        print(outcome(read(directory)))
+
+
+def _check(options: argparse.Namespace) -> None:
+    from porefv.progress import Progress
+    from porefv.report import scene_text
+    from porefv.scene import Scene
+
+    scene = Scene.read(options.scene)
+    progress = Progress()
+    _announce_compilation(progress)
+    with progress.stage("validation"):
+        packing = scene.check()
+    print(scene_text(scene, packing))
+
+
+def _info(options: argparse.Namespace) -> None:
+    from porefv.report import summary_text
+    from porefv.results import read
+
+    print(summary_text(read(options.results)))
+
+
+def _plot(options: argparse.Namespace) -> None:
+    from porefv.progress import Progress
+    from porefv.results import read
+    from porefv.viz import draw
+
+    with Progress().stage("drawing"):
+        draw(read(options.results), options.out)
+
+
+def _announce_compilation(progress: Progress) -> None:
+    """Say what is waited for, where numba has no compiled kernels from an earlier run."""
+    from porefv.tessellation import insertion
+
+    if not any(Path(insertion.insert.stats.cache_path or "").glob("insertion.insert-*.nbi")):
+        progress.note("compiling for this machine, this once; it takes about a minute")

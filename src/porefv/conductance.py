@@ -1,0 +1,95 @@
+"""Conductance models: what flows through a throat per unit of pressure gradient.
+
+A model is an object with a `name` and one method, so that a new one takes ten lines::
+
+    class Slits:
+        name = "slits"
+
+        def conductivity(self, throats, slip):
+            return throats.fluid_areas * (throats.volumes / throats.wetted_surfaces(slip)) ** 2 / 3
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from porefv.errors import InputError
+from porefv.throats import Throats
+
+
+class ConductanceModel(Protocol):
+    """What the flow asks of a conductance model."""
+
+    name: str
+
+    def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        """(t,): μ g of each throat [m⁴], such that q = g (p_i - p_j) / L.
+
+        `slip`, (6,) bool, marks the walls of symmetry. Values that are not positive mean a closed throat.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class HydraulicRadius:
+    """C12 eq. 8-9: μ g = α A^f R_h², R_h = φ / Σγ.
+
+    Parameters
+    ----------
+    alpha : float
+        Shape factor, 1/2 for a circular duct of radius 2 R_h (C12's choice).
+    """
+
+    alpha: float = 0.5
+    name = "hydraulic-radius"
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.alpha, (int, float)) and 0.0 < self.alpha < np.inf):
+            raise InputError(f"alpha must be a positive number, not {self.alpha!r}")
+
+    def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        volumes = throats.volumes
+        surfaces = throats.wetted_surfaces(slip)
+        sound = (volumes > 0.0) & (surfaces > 0.0)
+        radii = np.divide(volumes, surfaces, out=np.zeros(len(throats)), where=sound)
+        return self.alpha * throats.fluid_areas * radii**2
+
+
+@dataclass(frozen=True)
+class EffectiveRadius:
+    """C12 eq. 10 (Bryant and Blunt 1992): μ g = 2π r_eff⁴, r_eff = (r_eq + r_inscr) / 4.
+
+    r_eq is the radius of the disc of area A^f, r_inscr that of the circle in the facet's plane tangent to its spheres and
+    walls. A wall of symmetry doubles the throat by its mirror image: the circle then stands on the wall, and the
+    throat is half (a quarter, for two such walls) of the whole.
+    """
+
+    name = "effective-radius"
+
+    def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        images = throats.mirror_images(slip)
+        equivalent = np.sqrt(images * np.maximum(throats.fluid_areas, 0.0) / np.pi)
+        radii = 0.25 * (equivalent + throats.inscribed_radii(slip))
+        return np.where(radii > 0.0, 2.0 * np.pi * radii**4 / images, 0.0)
+
+
+MODELS = {model.name: model for model in (HydraulicRadius, EffectiveRadius)}
+
+
+def conductance_model(name: str, **parameters: float) -> ConductanceModel:
+    """The model of that name, `hydraulic-radius` or `effective-radius`.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or parameter.
+    """
+    if name not in MODELS:
+        raise InputError(f"unknown conductance {name!r}; known: {', '.join(MODELS)}")
+    try:
+        return MODELS[name](**parameters)
+    except TypeError:
+        raise InputError(f"conductance {name!r} takes no parameter {', '.join(parameters)}") from None

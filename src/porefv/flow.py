@@ -1,0 +1,274 @@
+"""PoreFlow: steady viscous flow through the pores of a fixed packing, each quantity computed when asked for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from porefv.boundary import Walls
+from porefv.conductance import ConductanceModel, HydraulicRadius
+from porefv.errors import InputError
+from porefv.forces import Forces, fluid_forces
+from porefv.mesh import PoreMesh
+from porefv.packing import WALLS, Packing
+from porefv.pressure import PressureSolution, solve_network
+from porefv.solvers import SolverReport
+from porefv.velocity import pore_velocities
+
+STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """A viscous, incompressible fluid.
+
+    Parameters
+    ----------
+    viscosity : float
+        Dynamic viscosity μ [Pa s].
+    density : float
+        Density ρ [kg/m³].
+    """
+
+    viscosity: float = 1.0e-3
+    density: float = 1000.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.viscosity) and self.viscosity > 0.0):
+            raise InputError(f"viscosity must be a positive number of Pa s, not {self.viscosity!r}")
+        if not (math.isfinite(self.density) and self.density >= 0.0):
+            raise InputError(f"density must be a number of kg/m³, zero or more, not {self.density!r}")
+
+
+class PoreFlow:
+    """Steady flow of a viscous fluid through the pores of a fixed packing (C12).
+
+    Pressures are piezometric, p = p* - ρ g·x: what drives the flow, without the hydrostatic part that gravity adds.
+
+    Parameters
+    ----------
+    mesh : PoreMesh or Packing
+    walls : Walls
+        Condition on each wall; at least one must hold a pressure.
+    fluid : Fluid
+    conductance : ConductanceModel
+    gravity : (3,) sequence of float
+        Acceleration of gravity, for buoyancy [m/s²].
+    solver, tolerance
+        See `porefv.solvers.solve`.
+
+    Examples
+    --------
+    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+    >>> print(f"{flow.permeability:.3g} m², {flow.forces}")
+    """
+
+    def __init__(
+        self,
+        mesh: PoreMesh | Packing,
+        walls: Walls,
+        fluid: Fluid | None = None,
+        conductance: ConductanceModel | None = None,
+        *,
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        solver: str = "auto",
+        tolerance: float = 1e-12,
+    ):
+        self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
+        self.walls = walls
+        self.fluid = fluid if fluid is not None else Fluid()
+        self.conductance = conductance if conductance is not None else HydraulicRadius()
+        self.gravity = np.asarray(gravity, float)
+        self.solver = solver
+        self.tolerance = tolerance
+        self.timings: dict[str, float] = {}
+        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
+            raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
+        if np.isnan(walls.pressures).all():
+            raise InputError(
+                "no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }"
+            )
+
+    # ---- pressure -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _reference(self) -> float:
+        """Pressure subtracted from all, so that a small drop on a large pressure keeps its digits."""
+        return float(np.nanmin(self.walls.pressures))
+
+    @cached_property
+    def fixed_pressures(self) -> np.ndarray:
+        """(n_pores,): imposed pressure of the pores on pressure walls less the lowest imposed one, NaN elsewhere [Pa].
+
+        Pores that touch several pressure walls take the mean of theirs.
+        """
+        faces = self.mesh.wall_faces
+        imposed = (self.walls.pressures - self._reference)[faces.walls]
+        held = ~np.isnan(imposed)
+        pores = self.mesh.cell_pore[faces.cells[held]]
+        pairs = np.unique(np.stack([pores, faces.walls[held]], axis=1), axis=0)
+        values = (self.walls.pressures - self._reference)[pairs[:, 1]]
+        count = np.bincount(pairs[:, 0], minlength=self.mesh.n_pores)
+        total = np.bincount(pairs[:, 0], values, self.mesh.n_pores)
+        return np.divide(total, count, out=np.full(self.mesh.n_pores, np.nan), where=count > 0)
+
+    @cached_property
+    def conductances(self) -> np.ndarray:
+        """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
+        with self._timed("throats"):
+            throats = self.mesh.throats
+            conductivity = self.conductance.conductivity(throats, self.walls.slip)
+            # A throat between Laguerre vertices closer than rounding is not longer than that.
+            shortest = np.finfo(float).eps * float(self.mesh.packing.radii.min())
+            lengths = np.maximum(throats.lengths, shortest)
+            passes = (conductivity > 0.0) & ~throats.closed
+            return np.where(passes, conductivity, 0.0) / (self.fluid.viscosity * lengths)
+
+    @cached_property
+    def solution(self) -> PressureSolution:
+        """The solved network, pressures less the lowest imposed one."""
+        conductances = self.conductances
+        with self._timed("solve"):
+            return solve_network(
+                self.mesh.throats.pores,
+                conductances,
+                self.fixed_pressures,
+                links=self.mesh.throats.areas,
+                solver=self.solver,
+                tolerance=self.tolerance,
+            )
+
+    @cached_property
+    def pressure(self) -> np.ndarray:
+        """(n_pores,): piezometric pressure of each pore [Pa]."""
+        return self.solution.pressure + self._reference
+
+    @property
+    def cell_pressure(self) -> np.ndarray:
+        """(n_cells,): piezometric pressure of each cell [Pa]."""
+        return self.pressure[self.mesh.cell_pore]
+
+    @property
+    def solver_report(self) -> SolverReport:
+        """Solver, iterations and residual."""
+        return self.solution.report
+
+    # ---- fluxes -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def flux(self) -> np.ndarray:
+        """(t,): flux through each throat, from its first pore to its second [m³/s]."""
+        p = self.solution.pressure
+        i, j = self.mesh.throats.pores.T
+        return self.conductances * (p[i] - p[j])
+
+    @cached_property
+    def _outflow(self) -> np.ndarray:
+        """(n_pores,): what each pore gives to its neighbours [m³/s]."""
+        i, j = self.mesh.throats.pores.T
+        n = self.mesh.n_pores
+        return np.bincount(i, self.flux, n) - np.bincount(j, self.flux, n)
+
+    @cached_property
+    def _face_flux(self) -> np.ndarray:
+        """(w,): flux into the sample through each wall face, shared by area among a pore's open faces [m³/s]."""
+        faces = self.mesh.wall_faces
+        pores = self.mesh.cell_pore[faces.cells]
+        open_area = np.where(np.isnan(self.walls.pressures)[faces.walls], 0.0, faces.areas)
+        total = np.bincount(pores, open_area, self.mesh.n_pores)[pores]
+        share = np.divide(open_area, total, out=np.zeros(len(pores)), where=total > 0.0)
+        return share * self._outflow[pores]
+
+    @property
+    def wall_flux(self) -> dict[str, float]:
+        """Flux into the sample through each wall [m³/s]; zero through impervious ones."""
+        totals = np.bincount(self.mesh.wall_faces.walls, self._face_flux, 6)
+        return {name: float(q) for name, q in zip(WALLS, totals, strict=True)}
+
+    @property
+    def inflow(self) -> float:
+        """Total flux through the walls where fluid enters [m³/s]."""
+        return sum(max(q, 0.0) for q in self.wall_flux.values())
+
+    @property
+    def outflow(self) -> float:
+        """Total flux through the walls where fluid leaves [m³/s]."""
+        return sum(max(-q, 0.0) for q in self.wall_flux.values())
+
+    @property
+    def imbalance(self) -> float:
+        """Inflow less outflow, relative to the larger."""
+        larger = max(self.inflow, self.outflow)
+        return abs(self.inflow - self.outflow) / larger if larger > 0.0 else 0.0
+
+    @cached_property
+    def permeability(self) -> float:
+        """k = μ Q h0 / (ΔP S) along the axis of the two pressure walls (C12 §3.3) [m²].
+
+        Raises
+        ------
+        InputError
+            If the pressure walls are not one pair of opposite walls at different pressures.
+        """
+        axis = self.walls.axis
+        pressures = self.walls.pressures
+        if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
+            raise InputError(
+                "permeability needs exactly two pressure walls, opposite each other and at different pressures"
+            )
+        drop = pressures[2 * axis] - pressures[2 * axis + 1]
+        flux = math.copysign(0.5 * (self.inflow + self.outflow), drop)
+        box = self.mesh.box
+        return self.fluid.viscosity * flux * float(box.size[axis]) / (drop * box.section(axis))
+
+    @property
+    def hydraulic_conductivity(self) -> float:
+        """k ρ g / μ, with standard gravity [m/s]."""
+        return self.permeability * self.fluid.density * STANDARD_GRAVITY / self.fluid.viscosity
+
+    @cached_property
+    def pore_velocity(self) -> np.ndarray:
+        """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
+        return pore_velocities(self.mesh, self.flux, self._face_flux)
+
+    # ---- forces -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def forces(self) -> Forces:
+        """Forces on every sphere and wall."""
+        pressure = self.solution.pressure
+        with self._timed("forces"):
+            return fluid_forces(
+                self.mesh,
+                pressure,
+                ~np.isnan(self.walls.pressures),
+                self.walls.slip,
+                reference=self._reference,
+                weight=self.fluid.density * self.gravity,
+            )
+
+    # ---- bookkeeping --------------------------------------------------------------------------------------------
+
+    def _timed(self, stage: str):
+        return _Timer(self.timings, stage)
+
+    def __repr__(self) -> str:
+        held = ", ".join(f"{name} {wall.pressure:g} Pa" for name, wall in zip(WALLS, self.walls, strict=True)
+                         if wall.pressure is not None)  # fmt: skip
+        return f"PoreFlow({self.mesh!r}, {self.conductance.name}, {held})"
+
+
+class _Timer:
+    def __init__(self, timings: dict[str, float], stage: str):
+        self.timings, self.stage = timings, stage
+
+    def __enter__(self) -> None:
+        self.begin = time.perf_counter()
+
+    def __exit__(self, *_) -> None:
+        self.timings[self.stage] = time.perf_counter() - self.begin

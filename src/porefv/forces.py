@@ -1,0 +1,169 @@
+"""Forces of the fluid on every sphere and wall, facet by facet (C12 §2.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from porefv.mesh import PoreMesh
+from porefv.packing import WALLS
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces on the solid [N], positive along the flow.
+
+    Attributes
+    ----------
+    pressure, viscous, buoyancy : (n, 3) arrays
+        On each sphere: C12 eq. 14, eq. 17-18, and the weight of the fluid displaced, -ρ V g.
+    wall_pressure, wall_viscous, wall_buoyancy : (6, 3) arrays
+        On each wall, in the order x_min, x_max, y_min, ...: the piezometric pressure on it, the drag along it, and the hydrostatic
+        pressure on it (zero at the highest corner of the box). Walls of imposed pressure are open: none but the
+        hydrostatic part.
+    thrust : (3,) array
+        Force of the imposed pressures on the ends of the sample: what all pressure and viscous forces add up to.
+    scale : float
+        Pressure range times section: what forces are measured against.
+    """
+
+    pressure: np.ndarray
+    viscous: np.ndarray
+    buoyancy: np.ndarray
+    wall_pressure: np.ndarray
+    wall_viscous: np.ndarray
+    wall_buoyancy: np.ndarray
+    thrust: np.ndarray
+    scale: float
+
+    @property
+    def total(self) -> np.ndarray:
+        """(n, 3): total force on each sphere [N]."""
+        return self.pressure + self.viscous + self.buoyancy
+
+    @property
+    def wall_total(self) -> np.ndarray:
+        """(6, 3): total force on each wall [N]."""
+        return self.wall_pressure + self.wall_viscous + self.wall_buoyancy
+
+    @property
+    def sums(self) -> dict[str, np.ndarray]:
+        """Sum of each part over the spheres, and over the walls [N]."""
+        return {
+            part: getattr(self, part).sum(axis=0)
+            for part in (
+                "pressure", "viscous", "buoyancy", "total",
+                "wall_pressure", "wall_viscous", "wall_buoyancy", "wall_total",
+            )
+        }  # fmt: skip
+
+    @property
+    def conservation_residual(self) -> float:
+        """Distance of the sum of all pressure and viscous forces from the thrust, relative to ΔP S."""
+        parts = (self.pressure, self.viscous, self.wall_pressure, self.wall_viscous)
+        residual = np.abs(sum(part.sum(axis=0) for part in parts) - self.thrust).max()
+        return float(residual / self.scale) if residual > 0.0 else 0.0
+
+    def __repr__(self) -> str:
+        total = ", ".join(f"{x:.4g}" for x in self.total.sum(axis=0))
+        return f"Forces({len(self.pressure)} spheres, total [{total}] N, residual {self.conservation_residual:.1e})"
+
+
+def fluid_forces(
+    mesh: PoreMesh,
+    pressure: np.ndarray,
+    pressure_walls: np.ndarray,
+    slip: np.ndarray,
+    *,
+    reference: float = 0.0,
+    weight: np.ndarray | None = None,
+) -> Forces:
+    """Forces due to a piezometric pressure field and the weight of the fluid.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    pressure : (n_pores,) array
+        Piezometric pressure of each pore less the reference [Pa].
+    pressure_walls, slip : (6,) bool arrays
+        Walls of imposed pressure; walls that do not drag the fluid.
+    reference : float
+        Pressure that all pores have besides [Pa]: pushes on the walls only.
+    weight : (3,) array, optional
+        Weight of a unit volume of fluid, ρ g [N/m³].
+    """
+    n = mesh.n_spheres
+    throats = mesh.throats
+    on_spheres_p = np.zeros((n + 6, 3))
+    on_spheres_v = np.zeros((n + 6, 3))
+    weights = throats.facet_wetted_surfaces(slip)
+    drops = np.subtract(*pressure[mesh.cell_pore[mesh.facet_cells]].T)
+    fluid = (throats.facet_areas - throats.facet_sectors.sum(axis=1))[:, None] * throats.facet_normals
+    vectors = throats.total_vectors(fluid)
+    sums = throats.total_by_facet(np.maximum(weights, 0.0).sum(axis=1))
+    _scatter(
+        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, weights, sums, drops, n,
+        on_spheres_p, on_spheres_v,
+    )  # fmt: skip
+
+    faces = mesh.wall_faces
+    face_pressure = pressure[mesh.cell_pore[faces.cells]]
+    push = np.zeros((6, 3))
+    thrust = np.zeros(3)
+    for wall in range(6):
+        on_wall = faces.walls == wall
+        axis, sense = wall // 2, (1.0 if wall % 2 else -1.0)
+        section = mesh.box.section(axis)
+        force = sense * (np.dot(face_pressure[on_wall], faces.areas[on_wall]) + reference * section)
+        if pressure_walls[wall]:
+            thrust[axis] -= force
+        else:
+            push[wall, axis] = force
+
+    volumes = 4.0 / 3.0 * np.pi * mesh.packing.radii**3
+    weight = np.zeros(3) if weight is None else np.asarray(weight, float)
+    sections = np.array([mesh.box.section(axis) for axis in range(3)])
+    spread = float(np.ptp(pressure)) or float(np.abs(pressure + reference).max()) or 1.0
+    return Forces(
+        pressure=on_spheres_p[:n],
+        viscous=on_spheres_v[:n],
+        buoyancy=-np.outer(volumes, weight),
+        wall_pressure=on_spheres_p[n:] + push,
+        wall_viscous=on_spheres_v[n:],
+        wall_buoyancy=_hydrostatic(mesh, weight),
+        thrust=thrust,
+        scale=max(spread, abs(reference)) * float(sections.max()),
+    )
+
+
+@njit(cache=True)
+def _scatter(facet_vertices, normals, sectors, vectors, weights, sums, drops, n, pressure, viscous):
+    """Add every facet's forces to its vertices.
+
+    F^{p,k} = A^k (p_i - p_j) n;  F^{v,k} = A^f (p_i - p_j) n γ^k / Σγ, the negative γ^k that a signed decomposition can
+    give taken as zero; where no γ^k is positive, the vertices share equally.
+    """
+    for f in range(facet_vertices.shape[0]):
+        if drops[f] == 0.0:
+            continue
+        for v in range(3):
+            k = facet_vertices[f, v]
+            share = max(weights[f, v], 0.0) / sums[f] if sums[f] > 0.0 else 1.0 / 3.0
+            for axis in range(3):
+                pressure[k, axis] += sectors[f, v] * drops[f] * normals[f, axis]
+                viscous[k, axis] += share * drops[f] * vectors[f, axis]
+
+
+def _hydrostatic(mesh, weight):
+    """(6, 3): force of a hydrostatic pressure, zero at the highest corner of the box, on each wall."""
+    forces = np.zeros((len(WALLS), 3))
+    size = mesh.box.size
+    for wall in range(6):
+        axis, upper = wall // 2, wall % 2
+        # Depth below the highest corner, at the middle of the wall, of each component of the weight.
+        depth = np.where(weight > 0.0, 0.5 * size, -0.5 * size)
+        depth[axis] = (size[axis] if upper else 0.0) - (0.0 if weight[axis] > 0.0 else size[axis])
+        forces[wall, axis] = (1.0 if upper else -1.0) * np.dot(weight, depth) * mesh.box.section(axis)
+    return forces

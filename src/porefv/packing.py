@@ -1,0 +1,326 @@
+"""Packing: spheres in a box with six walls; what they fill, where they overlap, and whether they fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from porefv.box import WALLS, Box, read_only
+from porefv.errors import InputError, counted, vector
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+__all__ = ["WALLS", "Box", "Overlaps", "Packing", "Source", "cap_volume", "lens_volume"]
+
+_MOST_SHOWN = 5  # culprits listed in one error
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The file a packing was read from, so that errors can name the line of a sphere.
+
+    Parameters
+    ----------
+    path : path
+    lines : (n,) integer array, optional
+        Line of each sphere, counted from 1; None for binary formats.
+    """
+
+    path: str | PathLike[str]
+    lines: NDArray[np.integer] | None = None
+
+    def name(self, sphere: int) -> str:
+        """``line 7 (sphere 5)``, or ``sphere 5`` if there are no lines."""
+        return f"sphere {sphere}" if self.lines is None else f"line {self.lines[sphere]} (sphere {sphere})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Overlaps:
+    """Spheres that overlap one another, and spheres that cross walls.
+
+    Parameters
+    ----------
+    pairs : (m, 2) int32 array
+        Overlapping spheres i < j, in lexicographic order.
+    depths : (m,) array, m
+        ``r_i + r_j - |c_i - c_j|``, positive.
+    wall_spheres, wall_ids : (w,) int32 arrays
+        Sphere and wall (position in `WALLS`) of each crossing.
+    wall_depths : (w,) array, m
+        How far the sphere reaches beyond the wall, positive.
+    """
+
+    pairs: Ints
+    depths: Floats
+    wall_spheres: Ints
+    wall_ids: Ints
+    wall_depths: Floats
+
+    def __repr__(self) -> str:
+        pairs, crossings = counted(len(self.pairs), "pair"), counted(len(self.wall_ids), "wall crossing")
+        return f"Overlaps({pairs}, {crossings})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Packing:
+    """Spheres, and the box whose six walls confine them.
+
+    Spheres are known by their position in `centres`. The arrays are copied, converted to float64, and
+    read-only.
+
+    Parameters
+    ----------
+    centres : (n, 3) array, m
+    radii : (n,) array, m
+    box : Box, optional
+        Needed by everything about porosity and flow.
+    source : Source, optional
+        File the spheres come from, to be named in errors.
+    metadata : dict, optional
+        Texts found in the file.
+
+    Raises
+    ------
+    InputError
+        If there is no sphere, a shape is wrong, a value is not finite, or a radius is not positive. Whether
+        the spheres fit one another and the box is left to `validate`.
+
+    Examples
+    --------
+    >>> Packing(centres=[[0.5, 0.5, 0.5]], radii=[0.5], box=Box([0, 0, 0], [1, 1, 1]))
+    Packing(1 sphere, radius 0.5 m, box 1×1×1 m)
+    """
+
+    centres: Floats
+    radii: Floats
+    box: Box | None
+    source: Source | None
+    metadata: dict[str, str]
+
+    def __init__(
+        self,
+        centres: ArrayLike,
+        radii: ArrayLike,
+        box: Box | None = None,
+        source: Source | None = None,
+        metadata: dict[str, str] | None = None,
+    ):
+        centres, radii = read_only(centres, "centres"), read_only(radii, "radii")
+        given = {"centres": centres, "radii": radii, "box": box, "source": source, "metadata": metadata or {}}
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
+        if centres.ndim != 2 or centres.shape[1] != 3 or radii.shape != centres.shape[:1]:
+            raise InputError(
+                f"{self._path()}centres must have shape (n, 3) and radii (n,), "
+                f"not {centres.shape} and {radii.shape}."
+            )
+        if len(radii) == 0:
+            raise InputError(f"{self._path()}there is no sphere. Give at least one.")
+        self._refuse(
+            np.flatnonzero(~(np.isfinite(centres).all(axis=1) & np.isfinite(radii))),
+            "values that are not finite",
+            "sphere",
+            lambda i: f"{self._name(i)}: centre {vector(centres[i])}, radius {radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
+        self._refuse(
+            np.flatnonzero(radii <= 0),
+            "radius not positive",
+            "sphere",
+            lambda i: f"{self._name(i)}: radius {radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
+
+    @classmethod
+    def read(cls, path: str | PathLike[str], format: str | None = None, box: Box | None = None) -> Packing:
+        """Read a packing file: see `porefv.io.read_packing`."""
+        from porefv.io import read_packing
+
+        return read_packing(path, format=format, box=box)
+
+    def write(self, path: str | PathLike[str], format: str | None = None) -> None:
+        """Write a packing file: see `porefv.io.write_packing`."""
+        from porefv.io import write_packing
+
+        write_packing(self, path, format=format)
+
+    def with_box(self, box: Box) -> Packing:
+        """The same spheres in another box."""
+        return replace(self, box=box)
+
+    @cached_property
+    def overlaps(self) -> Overlaps:
+        """Pairs of spheres that overlap, and spheres that cross walls (none without a box)."""
+        from porefv.neighbours import neighbour_pairs
+
+        try:
+            pairs = neighbour_pairs(self.centres, self.radii)
+        except InputError as error:
+            raise InputError(f"{self._path()}{error}") from None
+        i, j = pairs.T
+        depths = self.radii[i] + self.radii[j] - np.linalg.norm(self.centres[j] - self.centres[i], axis=1)
+        wall_depths = self.radii[:, None] - self._wall_distances()
+        spheres, walls = np.nonzero(wall_depths > 0)
+        return Overlaps(
+            pairs, depths, spheres.astype(np.int32), walls.astype(np.int32), wall_depths[spheres, walls]
+        )
+
+    @cached_property
+    def solid_volume(self) -> float:
+        """Volume of the union of the spheres, inside the box if there is one, m³.
+
+        Balls, less the lens shared by each overlapping pair, less the cap beyond each wall. Exact where no
+        point belongs to three of these at once, which moderate overlaps never reach.
+        """
+        found = self.overlaps
+        i, j = found.pairs.T
+        balls = 4 / 3 * np.pi * self.radii**3
+        lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
+        caps = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        return float(balls.sum() - lenses.sum() - caps.sum())
+
+    @cached_property
+    def porosity(self) -> float:
+        """Fraction of the box outside the spheres."""
+        return 1.0 - self.solid_volume / self._require_box().volume
+
+    def validate(self, wall_tolerance: float = 0.05) -> Packing:
+        """Check that the spheres fit one another and the box.
+
+        Moderate overlap (cemented or compressed grains) is legitimate: two spheres may overlap until the
+        centre of one lies in the other, and a sphere may reach beyond a wall by a fraction of its radius.
+        Centres lie strictly inside the box.
+
+        Parameters
+        ----------
+        wall_tolerance : float
+            Largest accepted reach beyond a wall, as a fraction of the radius.
+
+        Returns
+        -------
+        Packing
+            This one.
+
+        Raises
+        ------
+        InputError
+            Names up to five culprits, and counts them all.
+        """
+        if not wall_tolerance >= 0:
+            raise InputError(f"wall_tolerance must be a number >= 0, not {wall_tolerance}.")
+        box = self._require_box()
+        distances = self._wall_distances()
+        nearest = distances.argmin(axis=1)
+        beyond = self.radii - distances.min(axis=1)
+        enlarge = (
+            f"Correct or remove these spheres, or give a box larger than "
+            f"{vector(box.lower)} to {vector(box.upper)}."
+        )
+        self._refuse(
+            np.flatnonzero((distances <= 0).any(axis=1)),
+            "centre not inside the box",
+            "sphere",
+            lambda i: (
+                f"{self._name(i)}: centre {vector(self.centres[i])} is on or beyond {WALLS[nearest[i]]}"
+            ),
+            enlarge,
+        )
+        self._refuse(
+            np.flatnonzero(beyond > wall_tolerance * self.radii),
+            f"sphere reaches beyond a wall by more than {wall_tolerance:.6g} of its radius",
+            "sphere",
+            lambda i: (
+                f"{self._name(i)}: {beyond[i]:.6g} m beyond {WALLS[nearest[i]]}, "
+                f"{beyond[i] / self.radii[i]:.3g} of its radius {self.radii[i]:.6g} m"
+            ),
+            enlarge,
+        )
+        pairs = self.overlaps.pairs
+        self._refuse(
+            np.flatnonzero(self.overlaps.depths >= self.radii[pairs].min(axis=1)),
+            "overlap so deep that the centre of one sphere lies in the other",
+            "pair",
+            lambda k: self._describe_deep(pairs[k, 0], pairs[k, 1], self.overlaps.depths[k]),
+            "Remove one sphere of each pair, or correct centres and radii.",
+        )
+        return self
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def __repr__(self) -> str:
+        smallest, largest = self.radii.min(), self.radii.max()
+        radii = f"radius {smallest:.3g}" if smallest == largest else f"radii {smallest:.3g}...{largest:.3g}"
+        box = "no box" if self.box is None else f"box {self.box.sides}"
+        return f"Packing({counted(len(self), 'sphere')}, {radii} m, {box})"
+
+    def _wall_distances(self) -> Floats:
+        """(n, 6) distance of each centre from each wall, positive inside; (n, 0) without a box."""
+        if self.box is None:
+            return np.empty((len(self), 0))
+        distances = np.empty((len(self), 6))
+        distances[:, 0::2] = self.centres - self.box.lower
+        distances[:, 1::2] = self.box.upper - self.centres
+        return distances
+
+    def _require_box(self) -> Box:
+        if self.box is None:
+            raise InputError(
+                f"{self._path()}the packing has no box. Give one: lines '# box_lower = x y z' and "
+                "'# box_upper = x y z' in a CSV or Yade file, [box] with lower and upper in a scene, "
+                "or packing.with_box(Box(lower, upper)) in Python."
+            )
+        return self.box
+
+    def _refuse(
+        self, culprits: NDArray, what: str, kind: str, describe: Callable[[int], str], remedy: str
+    ) -> None:
+        """Raise an InputError that shows some of the culprits, if there are any."""
+        if len(culprits) == 0:
+            return
+        lines = [f"{self._path()}{what} ({counted(len(culprits), kind)}):"]
+        lines += [f"  {describe(culprit)}" for culprit in culprits[:_MOST_SHOWN]]
+        if len(culprits) > _MOST_SHOWN:
+            lines.append(f"  ... and {len(culprits) - _MOST_SHOWN} more")
+        raise InputError("\n".join([*lines, remedy]))
+
+    def _describe_deep(self, i: int, j: int, depth: float) -> str:
+        """A pair whose overlap is at least the smaller radius."""
+        small, big = (i, j) if self.radii[i] < self.radii[j] else (j, i)
+        if (self.centres[i] == self.centres[j]).all():
+            how = f"same centre {vector(self.centres[i])}"
+        elif depth >= 2 * self.radii[small]:
+            how = f"sphere {small} lies inside sphere {big}"
+        else:
+            how = f"the centre of sphere {small} lies in sphere {big}"
+        return f"{self._name(i)} and {self._name(j)}: {how}"
+
+    def _name(self, sphere: int) -> str:
+        return (self.source or Source("")).name(sphere)
+
+    def _path(self) -> str:
+        return f"{self.source.path}: " if self.source else ""
+
+
+def cap_volume(radius: Floats, height: Floats) -> Floats:
+    """Volume of the cap cut off a ball by a plane, m³; heights beyond the diameter give the whole ball."""
+    height = np.minimum(height, 2 * radius)
+    return np.pi * height**2 * (radius - height / 3)
+
+
+def lens_volume(r_i: Floats, r_j: Floats, distance: Floats) -> Floats:
+    """Volume shared by two overlapping balls, m³: two caps, or the smaller ball if it lies in the larger."""
+    depth = r_i + r_j - distance
+    engulfed = distance <= np.abs(r_i - r_j)
+    # The plane of intersection cuts caps of these heights; the factor `depth` keeps shallow lenses accurate.
+    twice = 2 * np.where(engulfed, 1.0, distance)
+    h_i = depth * (r_j - r_i + distance) / twice
+    h_j = depth * (r_i - r_j + distance) / twice
+    lens = cap_volume(r_i, h_i) + cap_volume(r_j, h_j)
+    return np.where(engulfed, 4 / 3 * np.pi * np.minimum(r_i, r_j) ** 3, lens)

@@ -1,0 +1,118 @@
+"""The pressure equation: Σ_j K_ij (p_i - p_j) = source, on the network of pores and throats (C12 eq. 20)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.csgraph import connected_components
+
+from porefv.errors import ComputationError
+from porefv.network import Network
+from porefv.solvers import SolverReport, solve
+
+
+@dataclass(frozen=True)
+class PressureSolution:
+    """Pressures of all pores.
+
+    Attributes
+    ----------
+    pressure : (n_pores,) array
+        Pressure of each pore [Pa].
+    isolated : (n_pores,) bool array
+        Pores from which no flow reaches a pore of imposed pressure.
+    report : SolverReport
+    """
+
+    pressure: np.ndarray
+    isolated: np.ndarray
+    report: SolverReport
+
+
+def solve_network(
+    pairs: np.ndarray,
+    conductances: np.ndarray,
+    fixed: np.ndarray,
+    *,
+    links: np.ndarray | None = None,
+    sources: np.ndarray | None = None,
+    solver: str = "auto",
+    tolerance: float = 1e-12,
+) -> PressureSolution:
+    """Solve for the pressures of the pores that are not fixed.
+
+    Parameters
+    ----------
+    pairs : (t, 2) int array
+        Pores joined by each throat.
+    conductances : (t,) array
+        K of each throat, not negative [m³/(Pa s)].
+    fixed : (n_pores,) array
+        Imposed pressures, NaN where free [Pa].
+    links : (t,) array, optional
+        Positive weights by which pores without any flowing path to an imposed pressure take theirs from their
+        neighbours (equal weights by default). Nothing flows there: the rule only keeps their pressure, which the flow leaves
+        open, within that of their surroundings.
+    sources : (n_pores,) array, optional
+        Volume injected into each free pore per unit time [m³/s].
+    solver, tolerance
+        See `porefv.solvers.solve`.
+
+    Raises
+    ------
+    ComputationError
+        If no pore is fixed, an isolated pore has a source, or the solver fails.
+    """
+    n = len(fixed)
+    free = np.isnan(fixed)
+    if free.all():
+        raise ComputationError("no pore has an imposed pressure: pressures are defined only up to a constant")
+    sources = np.zeros(n) if sources is None else sources
+    isolated = _isolated(pairs, conductances, free)
+    if np.any(sources[isolated] != 0.0):
+        pore = int(np.flatnonzero(isolated & (sources != 0.0))[0])
+        raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
+
+    pressure = np.where(free, 0.0, fixed)
+    pressure, report = _solve_free(pairs, conductances, pressure, free & ~isolated, sources, solver, tolerance)
+    if isolated.any():
+        links = np.ones(len(pairs)) if links is None else links
+        touching = isolated[pairs].any(axis=1)
+        pressure, _ = _solve_free(
+            pairs[touching], links[touching], pressure, isolated, np.zeros(n), "direct", tolerance
+        )
+    return PressureSolution(pressure, isolated, report)
+
+
+def _isolated(pairs, conductances, free):
+    n = len(free)
+    if np.all(conductances > 0.0):
+        return np.zeros(n, bool)  # the facets of the triangulation join all its cells
+    open_pairs = pairs[conductances > 0.0]
+    graph = sparse.coo_array((np.ones(len(open_pairs), np.int8), open_pairs.T), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    supplied = np.zeros(count, bool)
+    supplied[label[~free]] = True
+    return ~supplied[label]
+
+
+def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
+    """Pressures with those of the free pores solved for, all others held."""
+    count = int(np.count_nonzero(free))
+    number = np.full(len(free), -1, np.int32)
+    number[free] = np.arange(count, dtype=np.int32)
+    leaks = np.zeros(count)
+    rhs = sources[free].astype(float)
+    for i, j in (pairs.T, pairs.T[::-1]):
+        across = free[i] & ~free[j]
+        nodes = number[i[across]]
+        leaks += np.bincount(nodes, conductances[across], count)
+        rhs += np.bincount(nodes, conductances[across] * pressure[j[across]], count)
+    inside = free[pairs].all(axis=1)
+    network = Network.from_links(number[pairs[inside]], conductances[inside], leaks)
+    x, report = solve(network, rhs, solver, tolerance)
+    solved = pressure.copy()
+    solved[free] = x
+    return solved, report

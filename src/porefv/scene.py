@@ -1,0 +1,312 @@
+"""Scene: what to compute, from what, and where to put it; read from a TOML file and checked at the edge."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from porefv.boundary import Walls
+from porefv.conductance import MODELS, conductance_model
+from porefv.errors import InputError
+from porefv.flow import Fluid, PoreFlow
+from porefv.mesh import PoreMesh
+from porefv.packing import WALLS, Box, Packing
+from porefv.results import QUANTITIES, check_target, save, stages, writing
+from porefv.scene_table import Table
+from porefv.solvers import SOLVERS
+
+if TYPE_CHECKING:
+    from porefv.conductance import ConductanceModel
+    from porefv.progress import Progress
+
+
+@dataclass(frozen=True)
+class PackingFile:
+    """The packing file; `format` as in `porefv.io.read_packing`, by the extension if None."""
+
+    file: Path
+    format: str | None = None
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """As the parameters of `PoreMesh`; None leaves its default."""
+
+    unite_tolerance: float | None = None
+    wall_tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class FlowOptions:
+    """As the parameters of `PoreFlow`; a `tolerance` of None leaves its default."""
+
+    conductance: ConductanceModel
+    solver: str
+    tolerance: float | None
+    gravity: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Output:
+    """Which of `porefv.results.QUANTITIES` to compute, whether to write VTK files, and where."""
+
+    directory: Path
+    quantities: tuple[str, ...]
+    vtk: bool
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A computation, ready to run.
+
+    Attributes
+    ----------
+    packing : PackingFile
+    box : Box or None
+        None: the box is in the packing file.
+    fluid : Fluid
+    walls : Walls
+    mesh : MeshOptions
+    flow : FlowOptions
+    output : Output
+    path : Path or None
+        The scene file.
+
+    Examples
+    --------
+    >>> scene = Scene.read("data/scenes/n25.toml")  # doctest: +SKIP
+    >>> print(scene.pore_flow().permeability)  # doctest: +SKIP
+    """
+
+    packing: PackingFile
+    box: Box | None
+    fluid: Fluid
+    walls: Walls
+    mesh: MeshOptions
+    flow: FlowOptions
+    output: Output
+    path: Path | None = None
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> Scene:
+        """Read a scene file; relative paths in it are relative to its directory.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or says something that is unknown, of the wrong kind, or impossible.
+        """
+        path = Path(path)
+        return _scene(Table.read(path), path.parent, path)
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any], directory: str | PathLike[str] = ".") -> Scene:
+        """A scene from plain data, keys as in the file; relative paths are relative to `directory`."""
+        return _scene(Table(dict(data), source="scene"), Path(directory), None)
+
+    def read_packing(self) -> Packing:
+        """The packing, in the scene's box or its own."""
+        packing = Packing.read(self.packing.file, format=self.packing.format, box=self.box)
+        if packing.box is None:
+            raise InputError(
+                f"{self.path or 'scene'}: {self.packing.file} holds no box; give one in the scene:\n"
+                "[box]\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]"
+            )
+        return packing
+
+    def pore_mesh(self, packing: Packing | None = None) -> PoreMesh:
+        """The mesh of the packing, which is read and validated."""
+        options = {name: x for name, x in dataclasses.asdict(self.mesh).items() if x is not None}
+        return PoreMesh(self.read_packing() if packing is None else packing, **options)
+
+    def pore_flow(self, mesh: PoreMesh | None = None) -> PoreFlow:
+        """The flow through the packing: nothing is computed yet."""
+        tolerance = {} if self.flow.tolerance is None else {"tolerance": self.flow.tolerance}
+        return PoreFlow(
+            self.pore_mesh() if mesh is None else mesh,
+            self.walls,
+            self.fluid,
+            self.flow.conductance,
+            gravity=self.flow.gravity,
+            solver=self.flow.solver,
+            **tolerance,
+        )
+
+    def solve(self, *, force: bool = False, progress: Progress | None = None) -> Path:
+        """Compute what `output` asks for, and write the results directory.
+
+        Parameters
+        ----------
+        force : bool
+            Replace results that exist.
+        progress : Progress, optional
+            Its stages are those of `stages`.
+
+        Returns
+        -------
+        Path
+            The directory.
+
+        Raises
+        ------
+        InputError
+            If the packing is not fit for use, or the results cannot be written; before anything is computed.
+        ComputationError
+            If the computation fails; nothing is written.
+        """
+        from porefv.progress import Progress
+
+        progress = progress or Progress(self.stages, quiet=True)
+        output = self.output
+        with writing(output.directory, force=force, vtk=output.vtk) as folder:
+            with progress.stage("reading"):
+                packing = self.read_packing()
+            with progress.stage("validation"):
+                mesh = self.pore_mesh(packing)
+            flow = self.pore_flow(mesh) if output.quantities else None
+            save(
+                folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, progress=progress,
+                scene=str(self.path) if self.path else None, packing=str(self.packing.file),
+            )  # fmt: skip
+        return output.directory
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Stages of `solve`, in order."""
+        return ("reading", "validation", *stages(self.output.quantities, self.output.vtk))
+
+    def check(self) -> Packing:
+        """Read and validate everything `solve` would, computing nothing; the packing.
+
+        Raises
+        ------
+        InputError
+            As `solve`, save that results may exist.
+        """
+        check_target(self.output.directory, vtk=self.output.vtk)
+        return self.pore_mesh().packing
+
+
+def _scene(top: Table, directory: Path, path: Path | None) -> Scene:
+    top.only("packing", "box", "fluid", "walls", "mesh", "flow", "output")
+    scene = Scene(
+        packing=_packing(top, directory),
+        box=_box(top) if "box" in top.data else None,
+        fluid=_fluid(top.table("fluid")),
+        walls=_walls(top.table("walls")),
+        mesh=_mesh(top.table("mesh")),
+        flow=_flow(top.table("flow")),
+        output=_output(top.table("output"), directory),
+        path=path,
+    )
+    _check_driven(scene, top.source)
+    return scene
+
+
+def _packing(top: Table, directory: Path) -> PackingFile:
+    if isinstance(top.data.get("packing"), Mapping):
+        table = top.table("packing").only("file", "format")
+        found = PackingFile(directory / table.string("file"), table.string("format", None))
+        key = "file"
+    else:
+        table, key = top, "packing"
+        found = PackingFile(directory / top.string("packing"))
+    if not found.file.is_file():
+        what = "is not a file" if found.file.exists() else "does not exist"
+        raise table.error(key, f"{found.file} {what}; paths are relative to the scene file")
+    return found
+
+
+def _box(top: Table) -> Box:
+    table = top.table("box").only("lower", "upper")
+    lower, upper = table.vector("lower"), table.vector("upper")
+    try:
+        return Box(lower, upper)
+    except InputError as error:
+        raise table.error("upper", str(error)) from None
+
+
+def _fluid(table: Table) -> Fluid:
+    table.only("viscosity", "density")
+    given = {key: table.number(key) for key in table.data}
+    try:
+        return Fluid(**given)
+    except InputError as error:
+        key = next((key for key in given if key in str(error)), "viscosity")
+        raise table.error(key, str(error)) from None
+
+
+def _walls(table: Table) -> Walls:
+    table.only(*WALLS, "lateral", noun="wall")
+    for name in table.data:
+        table.table(name).only("pressure", "slip")
+    for name, values in table.data.items():
+        try:
+            Walls.from_mapping({name: values})
+        except InputError as error:
+            raise table.error(name, str(error)) from None
+    return Walls.from_mapping(table.data)
+
+
+def _mesh(table: Table) -> MeshOptions:
+    table.only("unite_tolerance", "wall_tolerance")
+    options = MeshOptions(table.number("unite_tolerance", None), table.number("wall_tolerance", None))
+    for key, value in dataclasses.asdict(options).items():
+        if value is not None and not 0.0 <= value < 1.0:
+            raise table.error(key, f"must lie in [0, 1), not {value!r}: a fraction of a radius")
+    return options
+
+
+def _flow(table: Table) -> FlowOptions:
+    table.only("conductance", "alpha", "solver", "tolerance", "gravity")
+    model = table.string("conductance", "hydraulic-radius", choices=MODELS)
+    try:
+        conductance = conductance_model(
+            model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {})
+        )
+    except InputError as error:
+        raise table.error("alpha", str(error)) from None
+    tolerance = table.number("tolerance", None)
+    if tolerance is not None and not 0.0 < tolerance < 1.0:
+        raise table.error(
+            "tolerance", f"must lie between 0 and 1, not {tolerance!r}: a bound on the relative residual"
+        )
+    return FlowOptions(
+        conductance=conductance,
+        solver=table.string("solver", "auto", choices=SOLVERS),
+        tolerance=tolerance,
+        gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
+    )
+
+
+def _output(table: Table, directory: Path) -> Output:
+    table.only("directory", "quantities", "vtk")
+    return Output(
+        directory=directory / table.string("directory", "results"),
+        quantities=table.strings("quantities", ("permeability",), choices=QUANTITIES),
+        vtk=table.flag("vtk", False),
+    )
+
+
+def _check_driven(scene: Scene, source: str) -> None:
+    """The walls drive what is asked for."""
+    asked = scene.output.quantities
+    held = [(name, wall) for name, wall in zip(WALLS, scene.walls, strict=True) if wall.pressure is not None]
+    if asked and not held:
+        raise InputError(
+            f"{source}: no wall has a pressure, and {', '.join(asked)} cannot be computed without. "
+            "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
+        )
+    if "permeability" in asked:
+        described = ", ".join(f"{name} at {wall.pressure:g} Pa" for name, wall in held)
+        axis = scene.walls.axis
+        pressures = scene.walls.pressures
+        if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
+            raise InputError(
+                f"{source}: permeability needs exactly two pressure walls, opposite each other and at "
+                f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
+            )

@@ -1,0 +1,165 @@
+"""Table: a table of a scene file, read key by key; errors name the file, the line, the key and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from porefv.errors import InputError
+
+_REQUIRED: Any = object()
+
+
+class Table:
+    """A table of a scene.
+
+    Parameters
+    ----------
+    data : dict
+        Its keys and values.
+    source : str
+        The scene file, to be named in errors.
+    text : str
+        The file's text, to find the lines of keys in.
+    name : str
+        The table's name, empty for the whole file.
+    """
+
+    def __init__(self, data: dict[str, Any], source: str, text: str = "", name: str = ""):
+        self.data, self.source, self.text, self.name = data, source, text, name
+
+    @classmethod
+    def read(cls, path: Path) -> Table:
+        """The whole of a TOML file."""
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is not a text file in UTF-8"
+            raise InputError(f"cannot read the scene {path}: {reason}") from None
+        try:
+            return cls(tomllib.loads(text), str(path), text)
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(_unreadable(path, text, str(error))) from None
+
+    def only(self, *known: str, noun: str = "key") -> Table:
+        """This table, whose keys are all among those known."""
+        for key in self.data:
+            if key not in known:
+                raise self.error(key, f"unknown {noun} '{key}'{suggestion(key, known)}")
+        return self
+
+    def table(self, key: str) -> Table:
+        """The table of that name, empty if there is none."""
+        value = self.data.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self.error(key, f"expected a table [{self._full(key)}], not {value!r}")
+        return Table(dict(value), self.source, self.text, self._full(key))
+
+    def string(self, key: str, default: Any = _REQUIRED, choices: Iterable[str] = ()) -> Any:
+        """A text, one of the choices if there are any."""
+        value = self._get(key, default)
+        if value is default:
+            return value
+        if not isinstance(value, str):
+            raise self.error(key, f"expected a text in quotes, not {value!r}")
+        choices = tuple(choices)
+        if choices and value not in choices:
+            raise self.error(key, f"unknown {key} '{value}'{suggestion(value, choices)}")
+        return value
+
+    def strings(self, key: str, default: Any, choices: Iterable[str]) -> tuple[str, ...]:
+        """A list of different texts among the choices, in the order of these."""
+        values = self._get(key, default)
+        choices = tuple(choices)
+        if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
+            raise self.error(key, f'expected a list such as ["{choices[0]}"], not {values!r}')
+        for value in values:
+            if value not in choices:
+                raise self.error(key, f"'{value}' is unknown{suggestion(value, choices)}")
+        return tuple(choice for choice in choices if choice in values)
+
+    def flag(self, key: str, default: bool) -> bool:
+        """True or false."""
+        value = self._get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, not {value!r}")
+        return value
+
+    def number(self, key: str, default: Any = _REQUIRED) -> Any:
+        """A finite number."""
+        value = self._get(key, default)
+        if value is not default and not _is_number(value):
+            raise self.error(key, f"expected a finite number, not {value!r}")
+        return value if value is default else float(value)
+
+    def vector(self, key: str, default: Any = _REQUIRED) -> tuple[float, float, float]:
+        """Three finite numbers."""
+        value = self._get(key, default)
+        if not isinstance(value, list | tuple) or len(value) != 3 or not all(_is_number(x) for x in value):
+            raise self.error(key, f"expected three finite numbers such as [0.0, 0.0, 1.0], not {value!r}")
+        return float(value[0]), float(value[1]), float(value[2])
+
+    def error(self, key: str, message: str) -> InputError:
+        """An error about a key of this table: where, and what."""
+        line = line_of(self.text, self.name, key)
+        where = self.source if line is None else f"{self.source}, line {line}"
+        return InputError(f"{where}: {f'[{self.name}] ' if self.name else ''}{message_of(key, message)}")
+
+    def _get(self, key: str, default: Any) -> Any:
+        if key not in self.data and default is _REQUIRED:
+            table = f"in [{self.name}]" if self.name else "at the top of the file"
+            raise self.error(key, f"missing; give it {table}")
+        return self.data.get(key, default)
+
+    def _full(self, key: str) -> str:
+        return f"{self.name}.{key}" if self.name else key
+
+
+def message_of(key: str, message: str) -> str:
+    """The message, after the key unless it names the key itself."""
+    named = f"'{key}'" in message or message.startswith((key, f"wall {key}"))
+    return message if named else f"{key}: {message}"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown word: the nearest known one, or all of them."""
+    known = tuple(known)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean '{near[0]}'?" if near else f"; known: {', '.join(known)}"
+
+
+def line_of(text: str, table: str, key: str) -> int | None:
+    """Line of a key of a table in TOML text, counted from 1; else the line of the table; else None."""
+    current, fallback = "", None
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
+            current = header[1].replace('"', "").replace(" ", "")
+            if current == (f"{table}.{key}" if table else key):
+                return number
+            fallback = number if current == table else fallback
+        elif assignment := re.match(r"\s*([\w.\"'-]+)\s*=", line):
+            path = ".".join(filter(None, [current, re.sub("[\"']", "", assignment[1])]))
+            if path == (f"{table}.{key}" if table else key):
+                return number
+            fallback = number if path == table else fallback  # an inline table
+    return fallback
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _unreadable(path: Path, text: str, message: str) -> str:
+    """A TOML error with the line it is on."""
+    found = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    if not found:
+        return f"{path}: not TOML: {message}"
+    number, column = int(found[1]), int(found[2])
+    line = text.split("\n")[number - 1].rstrip("\r")
+    pointer = " " * (column - 1) + "^"
+    return f"{path}, line {number}: not TOML: {message[: found.start()].strip()}\n    {line}\n    {pointer}"

@@ -1,0 +1,266 @@
+"""Incremental construction of the regular triangulation (Bowyer 1981, Watson 1981), one sphere after another.
+
+Arrays (capacity m cells)
+    cells (m, 4) int32       vertices, positively oriented; spheres < n, walls n .. n+5; cells[t, 0] = -1: free
+    neighbours (m, 4) int32  cell across the facet opposite to each vertex; -1 beyond a corner of the box
+    planes (m, 4)            (2 P, β): f(q) = |c_q|² - r_q² - β - 2 P·c_q is q's power to P less ρ² (six operations)
+    bounds (m,)              bound on the rounding error of f for any q in the box
+    marks (m,) int32         +s / -s: cell found in conflict / not in conflict with the s-th inserted sphere
+    ends (m, 4) int32        new cell built on each facet of the cavity's rim
+    free (m,) int32          stack of unused cells
+    state (4,) int64         [number in `free`, first never-used cell, last new cell, spheres inserted]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, power_centre, row, side
+
+# Relative error of a power centre beyond which it is computed again in exact arithmetic.
+_CENTRE_TOLERANCE = 2.0**-30
+
+
+@njit(cache=True)
+def start(q, n, points, weights, cells, neighbours, planes, bounds, free, state, extent, magnitude):
+    """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box."""
+    for corner in range(8):
+        outward = 1
+        cells[corner, 0] = q
+        for axis in range(3):
+            upper = (corner >> axis) & 1
+            outward *= 2 * upper - 1
+            cells[corner, axis + 1] = n + 2 * axis + upper
+            neighbours[corner, axis + 1] = corner ^ (1 << axis)
+        neighbours[corner, 0] = -1
+        if outward > 0:  # keep the orientation positive
+            cells[corner, 1], cells[corner, 2] = cells[corner, 2], cells[corner, 1]
+            neighbours[corner, 1], neighbours[corner, 2] = neighbours[corner, 2], neighbours[corner, 1]
+        _place(corner, q, n, points, weights, cells, planes, bounds, extent, magnitude)
+    state[0] = 0
+    state[1] = 8
+    state[2] = 0
+    state[3] = 1
+
+
+@njit(cache=True, nogil=True)
+def insert(
+    order, first, n, points, weights, cells, neighbours, planes, bounds, marks, ends, free, state, extent, magnitude
+):
+    """Insert the spheres order[first:]; returns how many were done (fewer where the arrays are full)."""
+    capacity = cells.shape[0]
+    stack = np.empty(1024, np.int32)
+    rim_cells = np.empty(1024, np.int32)
+    rim_facets = np.empty(1024, np.int8)
+    dead = np.empty(1024, np.int32)
+    for k in range(first, order.shape[0]):
+        q = order[k]
+        hq = (
+            points[q, 0] * points[q, 0]
+            + points[q, 1] * points[q, 1]
+            + points[q, 2] * points[q, 2]
+            - weights[q] * weights[q]
+        )
+        t = _find_conflict(state[2], q, hq, n, points, weights, cells, neighbours, planes, bounds)
+        if t < 0:
+            state[3] += 1  # hidden: lies above the lower hull, and so has no cell
+            continue
+
+        # The cavity: all cells in conflict form one connected set, found by search from the first.
+        stamp = np.int32(state[3] + 1)
+        marks[t] = stamp
+        stack[0] = t
+        n_stack = 1
+        n_rim = 0
+        n_dead = 0
+        while n_stack > 0:
+            n_stack -= 1
+            c = stack[n_stack]
+            if n_dead + 1 >= dead.shape[0]:
+                dead = _grown(dead)
+            dead[n_dead] = c
+            n_dead += 1
+            if n_stack + 4 >= stack.shape[0]:
+                stack = _grown(stack)
+            if n_rim + 4 >= rim_cells.shape[0]:
+                rim_cells = _grown(rim_cells)
+                rim_facets = _grown(rim_facets)
+            for i in range(4):
+                u = neighbours[c, i]
+                inside = False
+                if u >= 0:
+                    if marks[u] == stamp:
+                        continue
+                    if marks[u] != -stamp:
+                        f = hq - planes[u, 3] - (
+                            planes[u, 0] * points[q, 0] + planes[u, 1] * points[q, 1] + planes[u, 2] * points[q, 2]
+                        )
+                        if abs(f) > bounds[u]:
+                            inside = f < 0.0
+                        else:
+                            inside = in_conflict(cells[u], q, n, points, weights)
+                        marks[u] = stamp if inside else -stamp
+                if inside:
+                    stack[n_stack] = u
+                    n_stack += 1
+                else:
+                    rim_cells[n_rim] = c
+                    rim_facets[n_rim] = i
+                    n_rim += 1
+        if n_rim > state[0] + capacity - state[1]:
+            for d in range(n_dead):  # undo the marks: this sphere is inserted again into larger arrays
+                marks[dead[d]] = 0
+            return k
+
+        # One new cell on each facet of the rim: the facet and q.
+        for b in range(n_rim):
+            c = rim_cells[b]
+            i = rim_facets[b]
+            if state[0] > 0:
+                state[0] -= 1
+                new = free[state[0]]
+            else:
+                new = np.int32(state[1])
+                state[1] += 1
+            for j in range(4):
+                cells[new, j] = cells[c, j]
+                neighbours[new, j] = -2
+            cells[new, i] = q
+            marks[new] = 0
+            ends[c, i] = new
+            u = neighbours[c, i]
+            neighbours[new, i] = u
+            if u >= 0:
+                for j in range(4):
+                    if neighbours[u, j] == c:
+                        neighbours[u, j] = new
+            _place(new, q, n, points, weights, cells, planes, bounds, extent, magnitude)
+            state[2] = new
+
+        # New cells meet across facets through q: turn about the edge they share until the rim is met again.
+        for b in range(n_rim):
+            c = rim_cells[b]
+            i = rim_facets[b]
+            new = ends[c, i]
+            for j in range(4):
+                if j == i or neighbours[new, j] != -2:
+                    continue
+                current = c
+                out = j
+                pivot = np.int64(i)
+                while True:
+                    u = neighbours[current, out]
+                    if u < 0 or marks[u] != stamp:
+                        break
+                    v = cells[current, pivot]
+                    for m in range(4):
+                        if neighbours[u, m] == current:
+                            pivot = m
+                    for m in range(4):
+                        if cells[u, m] == v:
+                            out = m
+                    current = u
+                other = ends[current, out]
+                neighbours[new, j] = other
+                neighbours[other, pivot] = new
+        for d in range(n_dead):
+            cells[dead[d], 0] = -1
+            free[state[0]] = dead[d]
+            state[0] += 1
+        state[3] += 1
+    return order.shape[0]
+
+
+@njit(cache=True)
+def _find_conflict(t, q, hq, n, points, weights, cells, neighbours, planes, bounds):
+    """A cell in conflict with q, or -1 if q is hidden.
+
+    The cells' planes bound the lifted hull from below, f is the height of q above each, and the highest plane at q is
+    that of the cell holding q: so descend on f until it is surely negative. Where rounding blurs the
+    end of the descent, an exact visibility walk finds the cell that holds q; q is hidden if not in conflict there.
+    """
+    x = points[q, 0]
+    y = points[q, 1]
+    z = points[q, 2]
+    f = hq - planes[t, 3] - (planes[t, 0] * x + planes[t, 1] * y + planes[t, 2] * z)
+    while f >= -bounds[t]:
+        best = t
+        for i in range(4):
+            u = neighbours[t, i]
+            if u >= 0:
+                fu = hq - planes[u, 3] - (planes[u, 0] * x + planes[u, 1] * y + planes[u, 2] * z)
+                if fu < f:
+                    f = fu
+                    best = u
+        if best == t:
+            break
+        t = best
+    else:
+        return t
+    moved = True
+    while moved:
+        moved = False
+        for i in range(4):
+            u = neighbours[t, i]
+            if u >= 0 and side(cells[t], i, q, n, points, weights) < 0:
+                t = u
+                moved = True
+                break
+    return t if in_conflict(cells[t], q, n, points, weights) else -1
+
+
+@njit(cache=True)
+def _place(t, q, n, points, weights, cells, planes, bounds, extent, magnitude):
+    """Power centre of cell t, relative to its sphere q, with a bound on the error of f."""
+    k0 = 0 if cells[t, 0] != q else 1
+    k1 = k0 + 1 if cells[t, k0 + 1] != q else k0 + 2
+    k2 = k1 + 1 if cells[t, k1 + 1] != q else k1 + 2
+    a, ha, ta = row(cells[t, k0], q, n, points, weights)
+    b, hb, tb = row(cells[t, k1], q, n, points, weights)
+    c, hc, tc = row(cells[t, k2], q, n, points, weights)
+    d, scale = determinant(a, b, c)
+    # Cramer's rule: each minor and height carries a few ε of its permanent.
+    room = abs(d) - 8.0 * EPSILON * scale
+    error = np.inf
+    size = 0.0
+    centre = np.empty(3)
+    if room > 0.0:
+        error = 0.0
+        for axis in range(3):
+            u = (axis + 1) % 3
+            v = (axis + 2) % 3
+            value = (
+                ha * (b[u] * c[v] - b[v] * c[u])
+                + hb * (c[u] * a[v] - c[v] * a[u])
+                + hc * (a[u] * b[v] - a[v] * b[u])
+            )
+            permanent = (
+                ta * (abs(b[u] * c[v]) + abs(b[v] * c[u]))
+                + tb * (abs(c[u] * a[v]) + abs(c[v] * a[u]))
+                + tc * (abs(a[u] * b[v]) + abs(a[v] * b[u]))
+            )
+            centre[axis] = 0.5 * value / d
+            slack = EPSILON * (8.0 * permanent + 8.0 * abs(centre[axis]) * scale) / room
+            error += slack * extent[axis]
+            size += abs(centre[axis]) * extent[axis]
+    if not error <= _CENTRE_TOLERANCE * size:
+        exact = power_centre(cells[t], q, n, points, weights)
+        error = 0.0
+        for axis in range(3):
+            centre[axis] = exact[axis]
+            error += 8.0 * EPSILON * abs(exact[axis]) * extent[axis]
+    beta = -weights[q] * weights[q]
+    for axis in range(3):
+        p = centre[axis] + points[q, axis]
+        planes[t, axis] = 2.0 * p
+        beta += points[q, axis] * points[q, axis] - 2.0 * p * points[q, axis]
+    planes[t, 3] = beta
+    bounds[t] = 2.0 * error + 32.0 * EPSILON * magnitude
+
+
+@njit(cache=True)
+def _grown(array):
+    larger = np.empty(2 * array.shape[0], array.dtype)
+    larger[: array.shape[0]] = array
+    return larger

@@ -1,0 +1,49 @@
+"""The order of insertion: random in the large, along a space-filling curve in the small.
+
+Biased randomised insertion order (Amenta, Choi and Rote 2003): rounds of doubling size keep the expected cost
+linear for any packing, and sorting each round along a Morton curve keeps the search for the next
+sphere short and the memory warm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+_BITS = 20
+
+
+@njit(cache=True)
+def morton_codes(points, n):
+    """Morton code of the first n points: their coordinates on a 2^20 grid, bits interleaved."""
+    codes = np.empty(n, np.int64)
+    lower = np.empty(3)
+    size = 0.0
+    for axis in range(3):
+        lower[axis] = points[:n, axis].min()
+        size = max(size, points[:n, axis].max() - lower[axis])
+    inverse = ((1 << _BITS) - 1) / size if size > 0.0 else 0.0
+    for k in range(n):
+        code = np.int64(0)
+        for axis in range(3):
+            code |= _spread(np.int64((points[k, axis] - lower[axis]) * inverse)) << axis
+        codes[k] = code
+    return codes
+
+
+@njit(cache=True, inline="always")
+def _spread(x):
+    x = (x | (x << 32)) & 0x1F00000000FFFF
+    x = (x | (x << 16)) & 0x1F0000FF0000FF
+    x = (x | (x << 8)) & 0x100F00F00F00F00F
+    x = (x | (x << 4)) & 0x10C30C30C30C30C3
+    return (x | (x << 2)) & 0x1249249249249249
+
+
+def rounds(n: int) -> list[slice]:
+    """Bounds of the insertion rounds over randomly permuted spheres, each twice the one before."""
+    bounds = [n]
+    while bounds[-1] > 1000:
+        bounds.append(bounds[-1] // 2)
+    bounds.append(0)
+    return [slice(a, b) for a, b in zip(bounds[:0:-1], bounds[-2::-1], strict=True)]
