@@ -49,7 +49,7 @@ def test_summary_has_the_numbers_of_the_flow(flow, everything):
     assert summary["mesh"]["throats"] == len(flow.mesh.throats)
     assert summary["mesh"]["united_pores"] == flow.mesh.n_united
     assert summary["solver"]["name"] == flow.solver_report.name
-    assert summary["solver"]["residual"] == flow.solver_report.residual
+    assert summary["solver"]["imbalance"] == flow.solver_report.imbalance
     assert summary["forces"]["conservation_residual"] == flow.forces.conservation_residual
     for part, total in flow.forces.sums.items():
         np.testing.assert_array_equal(summary["forces"]["sums"][part], total)

@@ -33,8 +33,8 @@ def share_of(image, condition):
 
 
 def warm(red, green, blue):
-    """Colours of forces: yellow to red."""
-    return (red > blue + 60) & (red > green + 20)
+    """Colours of forces, orange to red; the yellow of high pressures is none."""
+    return (red > blue + 60) & (red > green + 40)
 
 
 def cool(red, green, blue):

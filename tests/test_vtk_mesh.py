@@ -57,8 +57,7 @@ def mesh(request):
 
 
 def test_vtk_finds_every_cell_valid(mesh):
-    # Positive volumes, faces outwards and convex, no node without a cell: by VTK's own judgement. Ties of lattices are cut by
-    # a perturbation, which leaves cells of any shape, but none flat or inside out.
+    # Positive volumes, convex, faces outwards, no node without a cell: by VTK's own judgement.
     grid = mesh.to_pyvista()
     assert grid.validate_mesh().invalid_fields == ()
 

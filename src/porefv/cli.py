@@ -7,8 +7,9 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from porefv import __version__
 from porefv.errors import PorefvError
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="A scene says what is wanted, and only that is computed. "
         "Exit status: 0 done, 1 the computation failed, 2 bad input.",
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     solve = commands.add_parser("solve", help="compute what a scene asks for, and write its results")
@@ -79,13 +80,6 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
     plot.set_defaults(command=_plot)
     return parser
-
-
-class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib.metadata import version
-
-        parser.exit(message=f"porefv {version('porefv')}\n")
 
 
 def _count(text: str) -> int:

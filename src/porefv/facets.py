@@ -320,3 +320,13 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip):
 def _unit(v):
     length = np.sqrt(_dot(v, v))
     return (v[0] / length, v[1] / length, v[2] / length) if length > 0.0 else v
+
+@njit(cache=True)
+def facet_centroids(facet_vertices, n, points, sizes):
+    """(f, 3): centroid of each facet."""
+    centres = np.empty((facet_vertices.shape[0], 3))
+    for f in range(facet_vertices.shape[0]):
+        x = centroid(facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2], n, points, sizes)
+        for axis in range(3):
+            centres[f, axis] = x[axis]
+    return centres

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from porefv.packing import WALLS, Packing
 from porefv.pressure import PressureSolution, solve_network
 from porefv.solvers import SolverReport
 from porefv.velocity import pore_velocities
+
+if TYPE_CHECKING:
+    from porefv.fipy_bridge import FipyProblem
 
 STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
 
@@ -102,11 +106,8 @@ class PoreFlow:
         return float(np.nanmin(self.walls.pressures))
 
     @cached_property
-    def fixed_pressures(self) -> np.ndarray:
-        """(n_pores,): imposed pressure of the pores on pressure walls less the lowest imposed one, NaN elsewhere [Pa].
-
-        Pores that touch several pressure walls take the mean of theirs.
-        """
+    def _held(self) -> np.ndarray:
+        """Imposed pressures less the lowest of them."""
         faces = self.mesh.wall_faces
         imposed = (self.walls.pressures - self._reference)[faces.walls]
         held = ~np.isnan(imposed)
@@ -116,6 +117,14 @@ class PoreFlow:
         count = np.bincount(pairs[:, 0], minlength=self.mesh.n_pores)
         total = np.bincount(pairs[:, 0], values, self.mesh.n_pores)
         return np.divide(total, count, out=np.full(self.mesh.n_pores, np.nan), where=count > 0)
+
+    @property
+    def imposed_pressures(self) -> np.ndarray:
+        """(n_pores,): imposed pressure of the pores on pressure walls, NaN elsewhere [Pa].
+
+        Pores that touch several pressure walls take the mean of theirs.
+        """
+        return self._held + self._reference
 
     @cached_property
     def conductances(self) -> np.ndarray:
@@ -137,7 +146,7 @@ class PoreFlow:
             return solve_network(
                 self.mesh.throats.pores,
                 conductances,
-                self.fixed_pressures,
+                self._held,
                 links=self.mesh.throats.areas,
                 solver=self.solver,
                 tolerance=self.tolerance,
@@ -251,6 +260,12 @@ class PoreFlow:
                 reference=self._reference,
                 weight=self.fluid.density * self.gravity,
             )
+
+    def to_fipy(self) -> FipyProblem:
+        """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
+        from porefv.fipy_bridge import FipyPoreMesh, FipyProblem
+
+        return FipyProblem(self, FipyPoreMesh(self.mesh, ~np.isnan(self._held)))
 
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 

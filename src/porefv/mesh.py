@@ -230,17 +230,17 @@ class PoreMesh:
 
         return to_pyvista(self, **cell_data)
 
-    def to_fipy(self, fixed: np.ndarray | None = None) -> FipyPoreMesh:
+    def to_fipy(self, held: np.ndarray | None = None) -> FipyPoreMesh:
         """The pores as a `fipy` mesh (see `porefv.fipy_bridge`).
 
         Parameters
         ----------
-        fixed : (n_pores,) bool array, optional
-            Pores of imposed pressure: left out of the mesh, their throats become exterior faces.
+        held : (n_pores,) bool array, optional
+            Pores of imposed value: left out of the mesh, their throats become exterior faces.
         """
         from porefv.fipy_bridge import FipyPoreMesh
 
-        return FipyPoreMesh(self, fixed)
+        return FipyPoreMesh(self, held)
 
     def __repr__(self) -> str:
         size = "×".join(f"{s:g}" for s in self.box.size)

@@ -127,7 +127,7 @@ def _solver_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         return []
     solver = summary["solver"]
     unknowns, iterations = f"{_count(solver['unknowns'])} unknowns", f"{solver['iterations']} iterations"
-    return [("solver", f"{solver['name']}, {unknowns}, {iterations}, residual {solver['residual']:.1e}")]
+    return [("solver", f"{solver['name']}, {unknowns}, {iterations}, imbalance {solver['imbalance']:.1e}")]
 
 
 def _walls(walls: Mapping[str, Mapping[str, Any]]) -> str:

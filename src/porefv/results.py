@@ -235,7 +235,10 @@ class Results:
             If forces were not asked for.
         """
         path = self._file("forces.csv", 'add "forces" to the quantities')
-        return np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            _, *numbers = file.readline().rstrip().split(",")
+        columns = [("id", "U16"), *((name, float) for name in numbers)]
+        return np.genfromtxt(path, delimiter=",", skip_header=1, dtype=columns, encoding="utf-8")
 
     @cached_property
     def pores(self) -> pyvista.UnstructuredGrid:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import porefv
 from porefv.packing import WALLS
 
 if TYPE_CHECKING:
@@ -141,8 +142,8 @@ def _unusual(flow: PoreFlow) -> dict[str, int]:
 
 
 def _versions(vtk: bool) -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for name in ("porefv", "numpy", "scipy", "numba", *(["vtk"] if vtk else [])):
+    found = {"porefv": porefv.__version__, "python": platform.python_version()}
+    for name in ("numpy", "scipy", "numba", *(["vtk"] if vtk else [])):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

@@ -107,6 +107,11 @@ class Throats:
         return throat, None, passes
 
     @property
+    def first_facets(self) -> np.ndarray:
+        """(t,): a facet of each throat, of the same sense."""
+        return self._groups[2]
+
+    @property
     def facet_throat(self) -> np.ndarray:
         """(f,): throat of each facet, -1 inside a united pore."""
         throat = self._groups[0]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from porefv.facets import centroid
+from porefv.facets import facet_centroids
 from porefv.mesh import PoreMesh
 
 
@@ -26,8 +25,8 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
     -------
     (n_pores, 3) array [m/s]; zero for pores without volume.
     """
-    first = mesh.throats._groups[2]
-    centres = _centroids(mesh.facet_vertices[first], mesh.n_spheres, mesh.local_points, mesh.sizes)
+    first = mesh.throats.first_facets
+    centres = facet_centroids(mesh.facet_vertices[first], mesh.n_spheres, mesh.local_points, mesh.sizes)
     i, j = mesh.throats.pores.T
     faces = mesh.wall_faces
     pores = mesh.cell_pore[faces.cells]
@@ -41,13 +40,3 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
         )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)
-
-
-@njit(cache=True)
-def _centroids(facet_vertices, n, points, sizes):
-    centres = np.empty((facet_vertices.shape[0], 3))
-    for f in range(facet_vertices.shape[0]):
-        x = centroid(facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2], n, points, sizes)
-        for axis in range(3):
-            centres[f, axis] = x[axis]
-    return centres
