@@ -150,6 +150,11 @@ def test_permeability_of_walls_that_have_none_is_refused(tmp_path):
     assert names(tmp_path) == []
 
 
+def test_unknown_quantity_is_refused(flow, tmp_path):
+    with pytest.raises(InputError, match="unknown quantity 'drag'; known: permeability"):
+        results.write(flow, tmp_path / "results", quantities=["drag"])
+
+
 # Overwriting
 
 

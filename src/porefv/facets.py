@@ -18,7 +18,7 @@ _NEXT = (1, 2, 0)
 _LAST = (2, 0, 1)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def spheres_first(a, b, c, n):
     """The three vertices turned, in cyclic order, until the spheres come first."""
     while a >= n or (b >= n and c < n):
@@ -60,17 +60,17 @@ def enumerate_facets(cells, neighbours, n):
     return facet_cells, vertices
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _towards(k, m, n, points):
     """From sphere k to vertex m: the vector between centres, or the outward direction of a wall."""
     if m < n:
@@ -78,7 +78,7 @@ def _towards(k, m, n, points):
     return points[m, 0], points[m, 1], points[m, 2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _height(k, wall, points, sizes):
     """Distance from the centre of sphere k to a wall."""
     return sizes[wall] - (
@@ -86,7 +86,7 @@ def _height(k, wall, points, sizes):
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def area_vector(a, b, c, n, points, sizes):
     """Area vector of a facet: triangle, trapezoid or rectangle."""
     s = _cross(_towards(a, b, n, points), _towards(a, c, n, points))
@@ -99,7 +99,7 @@ def area_vector(a, b, c, n, points, sizes):
     return factor * s[0], factor * s[1], factor * s[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def centroid(a, b, c, n, points, sizes):
     """Centroid of a facet."""
     u = _towards(a, b, n, points)
@@ -152,7 +152,7 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
             sectors[f, v] -= _half_segment(k, c, w, n, points, sizes)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _plane_distance(k, m, u, n, points, sizes):
     """Distance from centre k to the Laguerre plane towards m; u is the vector (direction) to m."""
     if m >= n:
@@ -161,7 +161,7 @@ def _plane_distance(k, m, u, n, points, sizes):
     return 0.5 * (square + (sizes[k] - sizes[m]) * (sizes[k] + sizes[m])) / np.sqrt(square)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _half_segment(k, m, u, n, points, sizes):
     """Half the part of the disc of sphere k beyond the Laguerre plane towards m (0 without overlap)."""
     r = sizes[k]
@@ -229,7 +229,7 @@ def facet_volumes(facet_cells, facet_vertices, vertices, n, points, sizes, volum
         volumes[f] = volume
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _trace(abc, v, n, points, sizes):
     """Length of the facet's trace on its wall abc[v]."""
     wall = abc[v]
@@ -241,7 +241,7 @@ def _trace(abc, v, n, points, sizes):
     return _height(a, abc[3 - v], points, sizes)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _tangent(u, v, w):
     """(numerator, denominator) of tan(Ω/2) for the triangle u, v, w (Van Oosterom and Strackee 1983)."""
     lu = np.sqrt(_dot(u, u))
@@ -250,7 +250,7 @@ def _tangent(u, v, w):
     return _dot(_cross(u, v), w), lu * lv * lw + _dot(u, v) * lw + _dot(v, w) * lu + _dot(w, u) * lv
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _solid_angle_between(u, v, qi, qj):
     """Signed solid angle of (u, v, qj) less that of (u, v, qi)."""
     ni, di = _tangent(u, v, qi)
@@ -260,7 +260,7 @@ def _solid_angle_between(u, v, qi, qj):
     return 2.0 * (np.arctan2(nj, dj) - np.arctan2(ni, di))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _dihedral(edge, normal, qi, qj):
     """Angle about an edge from the half-plane of qi to that of qj, counted from the facet's own side."""
     inward = _cross(normal, edge)
@@ -316,7 +316,7 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip):
     return radii
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _unit(v):
     length = np.sqrt(_dot(v, v))
     return (v[0] / length, v[1] / length, v[2] / length) if length > 0.0 else v

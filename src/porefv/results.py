@@ -69,8 +69,11 @@ def write(
     Raises
     ------
     InputError
-        If the results cannot be written: before anything is computed.
+        For an unknown quantity, or if the results cannot be written: before anything is computed.
     """
+    unknown = [quantity for quantity in quantities if quantity not in QUANTITIES]
+    if unknown:
+        raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     with writing(directory, force=force, vtk=vtk) as folder:
         save(folder, flow.mesh, flow, quantities=quantities, vtk=vtk)
     return Path(directory)
@@ -100,7 +103,10 @@ def check_target(directory: str | PathLike[str], *, vtk: bool) -> None:
         vtk_data_model()
     directory = Path(directory)
     if directory.is_dir():
-        content = sorted(entry.name for entry in directory.iterdir())
+        try:
+            content = sorted(os.listdir(directory))
+        except OSError as error:
+            raise InputError(f"cannot write {directory}: {error.strerror}.") from None
         foreign = [name for name in content if name not in FILES]
         if "summary.json" in content and foreign:
             raise InputError(

@@ -243,12 +243,11 @@ def _fluid(table: Table) -> Fluid:
 def _walls(table: Table) -> Walls:
     table.only(*WALLS, "lateral", noun="wall")
     for name in table.data:
-        table.table(name).only("pressure", "slip")
-    for name, values in table.data.items():
-        try:
-            Walls.from_mapping({name: values})
-        except InputError as error:
-            raise table.error(name, str(error)) from None
+        wall = table.table(name).only("pressure", "slip")
+        wall.number("pressure", None)
+        wall.flag("slip", False)
+        if name == "lateral" and "pressure" in wall.data:
+            raise wall.error("pressure", "the lateral walls have none; give it wall by wall (x_min = ...)")
     return Walls.from_mapping(table.data)
 
 

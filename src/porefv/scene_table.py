@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
+import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -122,8 +122,7 @@ class Table:
 
 def message_of(key: str, message: str) -> str:
     """The message, after the key unless it names the key itself."""
-    named = f"'{key}'" in message or message.startswith((key, f"wall {key}"))
-    return message if named else f"{key}: {message}"
+    return message if f"'{key}'" in message or message.startswith(key) else f"{key}: {message}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
@@ -151,7 +150,9 @@ def line_of(text: str, table: str, key: str) -> int | None:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max  # false for nan, and for integers that are no float
 
 
 def _unreadable(path: Path, text: str, message: str) -> str:

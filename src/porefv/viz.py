@@ -1,6 +1,6 @@
 """A picture of a flow: the sample cut open, grains coloured by the force on them, pores by their pressure.
 
-viz.picture(results.spheres, results.pores).screenshot("flow.png")      # or .show() in a notebook
+Typically: `viz.flow_picture(flow).screenshot("flow.png")`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from numba import njit
 _SPLITTER = 134217729.0  # 2**27 + 1 cuts a double in two halves of 26 bits
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def two_sum(a, b):
     """The sum a + b as (rounded, error), exactly."""
     x = a + b
@@ -25,7 +25,7 @@ def two_sum(a, b):
     return x, (a - (x - bv)) + (b - bv)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def two_product(a, b):
     """The product a b as (rounded, error), exactly."""
     x = a * b
@@ -123,7 +123,7 @@ def estimate(e, ne):
     return value
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def sign(e, ne):
     """-1, 0 or 1: the sign of an expansion is that of its largest component."""
     if ne == 0:

@@ -31,7 +31,7 @@ def morton_codes(points, n):
     return codes
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _spread(x):
     x = (x | (x << 32)) & 0x1F00000000FFFF
     x = (x | (x << 16)) & 0x1F0000FF0000FF

@@ -28,7 +28,7 @@ _MINOR_BOUND = 8.0 * EPSILON
 _CONFLICT_BOUND = 24.0 * EPSILON
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def determinant(a, b, c):
     """det of three rows and its permanent of absolute values (the scale of its rounding error)."""
     m0 = b[1] * c[2] - b[2] * c[1]
@@ -40,7 +40,7 @@ def determinant(a, b, c):
     return a[0] * m0 + a[1] * m1 + a[2] * m2, abs(a[0]) * p0 + abs(a[1]) * p1 + abs(a[2]) * p2
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def row(v, q, n, points, weights):
     """a_k, H_k and the magnitude of the terms of H_k, in floating point."""
     if v < n:
@@ -130,7 +130,7 @@ def power_centre(cell, q, n, points, weights):
     return centre
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _others(i):
     if i == 0:
         return 1, 2, 3
