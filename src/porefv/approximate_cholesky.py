@@ -1,9 +1,9 @@
 """Approximate Cholesky factor of a network, by elimination with sampled fill.
 
-Eliminating a node joins all its neighbours to each other. Instead of that clique a random tree with the same mean is
-added, each neighbour linked to one of the more strongly joined ones with probability in proportion to its link. The factor stays as
-sparse as the network, for any geometry, size and contrast, and as a preconditioner takes conjugate gradients
-to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016, doi:10.1109/FOCS.2016.68;
+Eliminating a node joins all its neighbours to each other. Instead of that clique a random tree with the same mean
+is added, each neighbour linked to one of the more strongly joined ones with probability in proportion to its link.
+The factor stays nearly as sparse as the network, for any geometry, size and contrast, and as a preconditioner takes
+conjugate gradients to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016, doi:10.1109/FOCS.2016.68;
 Gao, Kyng and Spielman 2023, arXiv:2303.00709). The random numbers are seeded: equal networks have equal factors.
 """
 
@@ -210,5 +210,6 @@ def substitute(order, starts, rows, factors, pivots, r, y, z):
 @njit(cache=True)
 def _doubled(array):
     larger = np.empty(2 * array.shape[0], array.dtype)
-    larger[: array.shape[0]] = array
+    for i in range(array.shape[0]):
+        larger[i] = array[i]
     return larger

@@ -84,7 +84,7 @@ class Walls:
             if unknown:
                 raise InputError(f"wall {name}: unknown key {unknown[0]!r}; a wall has pressure and slip")
             if name == "lateral" and "pressure" in value:
-                raise InputError("wall lateral: a pressure is given wall by wall (x_min, ...), not to all lateral walls")
+                raise InputError("wall lateral: a pressure is given wall by wall (x_min, ...), not to all the rest")
             try:
                 conditions[name] = Wall(**value)
             except InputError as error:

@@ -321,6 +321,7 @@ def _unit(v):
     length = np.sqrt(_dot(v, v))
     return (v[0] / length, v[1] / length, v[2] / length) if length > 0.0 else v
 
+
 @njit(cache=True)
 def facet_centroids(facet_vertices, n, points, sizes):
     """(f, 3): centroid of each facet."""

@@ -44,7 +44,7 @@ def _import_fipy() -> Any:
 fipy = _import_fipy()
 
 
-class FipyPoreMesh(fipy.meshes.mesh.Mesh):
+class FipyPoreMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     """Pores as the cells of a genuine FiPy mesh.
 
     Cells are the pores that are not held, in order; faces are facets between different pores, and the pores' faces on the
@@ -76,7 +76,9 @@ class FipyPoreMesh(fipy.meshes.mesh.Mesh):
     def __init__(self, mesh: PoreMesh, held: np.ndarray | None = None):
         held = np.zeros(mesh.n_pores, bool) if held is None else np.asarray(held)
         if held.shape != (mesh.n_pores,) or held.dtype != bool:
-            raise InputError(f"held must be a bool array of one value a pore ({mesh.n_pores}), not {held.dtype}{held.shape}")
+            raise InputError(
+                f"held must be a bool array of one value a pore ({mesh.n_pores}), not {held.dtype}{held.shape}"
+            )
         if held.all():
             raise InputError("every pore is held: nothing is left to solve for")
         self.pore_mesh = mesh
@@ -114,16 +116,16 @@ class FipyPoreMesh(fipy.meshes.mesh.Mesh):
 
     # The geometry FiPy would derive from its vertices, taken from the pore mesh instead.
 
-    def _calcFaceAreas(self):  # noqa: N802 (FiPy's name)
+    def _calcFaceAreas(self):
         return self._given_areas
 
-    def _calcFaceCenters(self):  # noqa: N802
+    def _calcFaceCenters(self):
         return self._given_centres
 
-    def _calcFaceNormals(self):  # noqa: N802
+    def _calcFaceNormals(self):
         return self._given_normals
 
-    def _calcCellDistAndVec(self):  # noqa: N802
+    def _calcCellDistAndVec(self):
         distances, vectors = super()._calcCellDistAndVec()
         distances = np.array(distances)
         distances[: len(self._given_distances)] = self._given_distances

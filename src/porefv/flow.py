@@ -94,9 +94,7 @@ class PoreFlow:
         if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
             raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
         if np.isnan(walls.pressures).all():
-            raise InputError(
-                "no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }"
-            )
+            raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
 
     # ---- pressure -----------------------------------------------------------------------------------------------
 

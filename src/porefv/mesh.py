@@ -244,7 +244,4 @@ class PoreMesh:
 
     def __repr__(self) -> str:
         size = "×".join(f"{s:g}" for s in self.box.size)
-        return (
-            f"PoreMesh({self.n_spheres} spheres, {self.n_pores} pores, "
-            f"{len(self.throats)} throats, box {size} m)"
-        )
+        return f"PoreMesh({self.n_spheres} spheres, {self.n_pores} pores, {len(self.throats)} throats, box {size} m)"

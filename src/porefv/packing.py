@@ -117,8 +117,7 @@ class Packing:
             object.__setattr__(self, name, value)
         if centres.ndim != 2 or centres.shape[1] != 3 or radii.shape != centres.shape[:1]:
             raise InputError(
-                f"{self._path()}centres must have shape (n, 3) and radii (n,), "
-                f"not {centres.shape} and {radii.shape}."
+                f"{self._path()}centres must have shape (n, 3) and radii (n,), not {centres.shape} and {radii.shape}."
             )
         if len(radii) == 0:
             raise InputError(f"{self._path()}there is no sphere. Give at least one.")
@@ -167,9 +166,7 @@ class Packing:
         depths = self.radii[i] + self.radii[j] - np.linalg.norm(self.centres[j] - self.centres[i], axis=1)
         wall_depths = self.radii[:, None] - self._wall_distances()
         spheres, walls = np.nonzero(wall_depths > 0)
-        return Overlaps(
-            pairs, depths, spheres.astype(np.int32), walls.astype(np.int32), wall_depths[spheres, walls]
-        )
+        return Overlaps(pairs, depths, spheres.astype(np.int32), walls.astype(np.int32), wall_depths[spheres, walls])
 
     @cached_property
     def solid_volume(self) -> float:
@@ -219,16 +216,13 @@ class Packing:
         nearest = distances.argmin(axis=1)
         beyond = self.radii - distances.min(axis=1)
         enlarge = (
-            f"Correct or remove these spheres, or give a box larger than "
-            f"{vector(box.lower)} to {vector(box.upper)}."
+            f"Correct or remove these spheres, or give a box larger than {vector(box.lower)} to {vector(box.upper)}."
         )
         self._refuse(
             np.flatnonzero((distances <= 0).any(axis=1)),
             "centre not inside the box",
             "sphere",
-            lambda i: (
-                f"{self._name(i)}: centre {vector(self.centres[i])} is on or beyond {WALLS[nearest[i]]}"
-            ),
+            lambda i: f"{self._name(i)}: centre {vector(self.centres[i])} is on or beyond {WALLS[nearest[i]]}",
             enlarge,
         )
         self._refuse(
@@ -278,9 +272,7 @@ class Packing:
             )
         return self.box
 
-    def _refuse(
-        self, culprits: NDArray, what: str, kind: str, describe: Callable[[int], str], remedy: str
-    ) -> None:
+    def _refuse(self, culprits: NDArray, what: str, kind: str, describe: Callable[[int], str], remedy: str) -> None:
         """Raise an InputError that shows some of the culprits, if there are any."""
         if len(culprits) == 0:
             return

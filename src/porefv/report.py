@@ -84,9 +84,7 @@ def summary_text(results: Results) -> str:
             ("versions", ", ".join(f"{name} {number}" for name, number in summary["versions"].items())),
         ]),
     ]  # fmt: skip
-    lines = [
-        f"{_path(results.directory)}: {summary['scene'] and _path(summary['scene'])}, {summary['created']}"
-    ]
+    lines = [f"{_path(results.directory)}: {summary['scene'] and _path(summary['scene'])}, {summary['created']}"]
     for title, rows in paragraphs:
         if rows:
             lines += ["", title, *_rows(rows)]

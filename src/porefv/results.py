@@ -173,12 +173,8 @@ def _write_forces(flow: PoreFlow, path: Path) -> None:
     positions = np.tile(middle, (6, 1))
     for wall in range(6):
         positions[wall, wall // 2] = (box.upper if wall % 2 else box.lower)[wall // 2]
-    on_spheres = (
-        np.column_stack([packing.centres, packing.radii, *(getattr(forces, part) for part in _PARTS)]) + 0.0
-    )
-    on_walls = (
-        np.column_stack([positions, *(getattr(forces, f"wall_{part}") for part in _PARTS)]) + 0.0
-    )  # no -0.0
+    on_spheres = np.column_stack([packing.centres, packing.radii, *(getattr(forces, part) for part in _PARTS)]) + 0.0
+    on_walls = np.column_stack([positions, *(getattr(forces, f"wall_{part}") for part in _PARTS)]) + 0.0  # no -0.0
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(["id", "x", "y", "z", "radius", *columns]) + "\n")
         # repr gives the shortest text that reads back to the same number.
@@ -264,9 +260,7 @@ class Results:
     def _file(self, name: str, remedy: str) -> Path:
         path = self.directory / name
         if not path.is_file():
-            raise InputError(
-                f"{self.directory} has no {name}: {remedy} in the scene's [output], and solve again."
-            )
+            raise InputError(f"{self.directory} has no {name}: {remedy} in the scene's [output], and solve again.")
         return path
 
     def _read_vtk(self, name: str) -> Any:
@@ -294,7 +288,5 @@ def read(directory: str | PathLike[str]) -> Results:
         reason = error.strerror if isinstance(error, OSError) else f"summary.json is damaged ({error})"
         raise InputError(f"{directory} holds no results of porefv solve: {reason}") from None
     if not isinstance(summary, dict) or "packing" not in summary:
-        raise InputError(
-            f"{directory} holds no results of porefv solve: its summary.json is another program's"
-        )
+        raise InputError(f"{directory} holds no results of porefv solve: its summary.json is another program's")
     return Results(directory, summary)

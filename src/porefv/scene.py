@@ -264,16 +264,12 @@ def _flow(table: Table) -> FlowOptions:
     table.only("conductance", "alpha", "solver", "tolerance", "gravity")
     model = table.string("conductance", "hydraulic-radius", choices=MODELS)
     try:
-        conductance = conductance_model(
-            model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {})
-        )
+        conductance = conductance_model(model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {}))
     except InputError as error:
         raise table.error("alpha", str(error)) from None
     tolerance = table.number("tolerance", None)
     if tolerance is not None and not 0.0 < tolerance < 1.0:
-        raise table.error(
-            "tolerance", f"must lie between 0 and 1, not {tolerance!r}: a bound on the relative residual"
-        )
+        raise table.error("tolerance", f"must lie between 0 and 1, not {tolerance!r}: a bound on the relative residual")
     return FlowOptions(
         conductance=conductance,
         solver=table.string("solver", "auto", choices=SOLVERS),

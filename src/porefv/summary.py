@@ -95,8 +95,7 @@ def _mesh(mesh: PoreMesh) -> dict[str, Any]:
 
 def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
     walls = {
-        name: {"pressure": wall.pressure, "slip": bool(wall.slip)}
-        for name, wall in zip(WALLS, flow.walls, strict=True)
+        name: {"pressure": wall.pressure, "slip": bool(wall.slip)} for name, wall in zip(WALLS, flow.walls, strict=True)
     }
     found: dict[str, Any] = {
         "fluid": {"viscosity": flow.fluid.viscosity, "density": flow.fluid.density},

@@ -26,7 +26,7 @@ class Throats:
     Notes
     -----
     Signed values make the sums over all facets exact: Σφ is the void volume, Σγ^k the free surface of sphere k. Where
-    spheres overlap, or a throat is nearly closed, single values of φ, γ or A^f may be zero or negative (`unusual`).
+    spheres overlap, or a throat is nearly closed, single values of φ, γ or A^f may be zero or negative: such throats carry no flow, and are counted.
     """
 
     def __init__(self, mesh: PoreMesh):
@@ -98,9 +98,7 @@ class Throats:
         if mesh.cell_node.max() + 1 < mesh.n_cells:  # there are ties
             nodes = mesh.cell_node[mesh.facet_cells[passes]].astype(np.int64)
             low, high = nodes.min(axis=1), nodes.max(axis=1)
-            _, first, throat[passes] = np.unique(
-                low * mesh.n_cells + high, return_index=True, return_inverse=True
-            )
+            _, first, throat[passes] = np.unique(low * mesh.n_cells + high, return_index=True, return_inverse=True)
             sense = np.where(nodes[:, 0] == nodes[first[throat[passes]], 0], 1.0, -1.0)
             return throat, sense, passes[first]
         throat[passes] = np.arange(len(passes))
@@ -197,9 +195,7 @@ class Throats:
         several facets, the least.
         """
         mesh = self.mesh
-        radii = inscribed_circles(
-            mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip)
-        )
+        radii = inscribed_circles(mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip))
         throat, _, first = self._groups
         least = radii[first]
         if throat is not None:

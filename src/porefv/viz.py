@@ -69,9 +69,7 @@ def flow_picture(
     pv = _pyvista()
     data = {"total_force": flow.forces.total} if forces else {}
     spheres = pv.PolyData(spheres_polydata(flow.mesh.packing, **data))
-    return picture(
-        spheres, flow.mesh.to_pyvista(pressure=flow.pressure), walls=flow.walls, title=title, size=size
-    )
+    return picture(spheres, flow.mesh.to_pyvista(pressure=flow.pressure), walls=flow.walls, title=title, size=size)
 
 
 def picture(
@@ -170,9 +168,7 @@ def _add_spheres(pv: Any, plotter: Any, spheres: Any, view: _View, opened: bool)
         behind, before = crossing.clip(left, origin=view.middle, return_clipped=True)
         surface = surface.append_polydata(behind, before.clip(right, origin=view.middle))
     if surface.n_points:
-        plotter.add_mesh(
-            surface, smooth_shading=True, ambient=0.15, specular=0.25, specular_power=20, **colours
-        )
+        plotter.add_mesh(surface, smooth_shading=True, ambient=0.15, specular=0.25, specular_power=20, **colours)
 
 
 def _add_pressures(pv: Any, plotter: Any, spheres: Any, pores: Any, view: _View) -> None:
@@ -183,9 +179,7 @@ def _add_pressures(pv: Any, plotter: Any, spheres: Any, pores: Any, view: _View)
     for axis, other in ((view.left, view.right), (view.right, view.left)):
         normal, beyond = view.normal(axis), view.normal(other)
         section = pores.slice(normal=normal, origin=view.middle).clip(-beyond, origin=view.middle)
-        plotter.add_mesh(
-            section, scalars="pressure", cmap=_PRESSURES, clim=clim, lighting=False, scalar_bar_args=bar
-        )
+        plotter.add_mesh(section, scalars="pressure", cmap=_PRESSURES, clim=clim, lighting=False, scalar_bar_args=bar)
         points, radii = spheres.points, spheres["radius"]
         heights = view.middle[axis] - points[:, axis]
         crossed = np.flatnonzero(np.abs(heights) < radii)

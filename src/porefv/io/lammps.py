@@ -144,9 +144,7 @@ def _bounds(path: AnyPath, line: int, lower: str, upper: str) -> tuple[float, fl
 
 def _check_number(path: AnyPath, declared: int, found: int, last_line: int) -> None:
     if declared != found or found == 0:
-        raise InputError(
-            f"{path}, line {last_line}: {declared} atoms declared, {found} given. Was the file cut off?"
-        )
+        raise InputError(f"{path}, line {last_line}: {declared} atoms declared, {found} given. Was the file cut off?")
 
 
 def _packing(path: AnyPath, values: NDArray, lines: NDArray, box: Box | None) -> Packing:
@@ -156,7 +154,5 @@ def _packing(path: AnyPath, values: NDArray, lines: NDArray, box: Box | None) ->
     twice = np.flatnonzero(values[1:, 0] == values[:-1, 0])
     if len(twice):
         k = twice[0]
-        raise InputError(
-            f"{path}, line {lines[k + 1]}: atom id {values[k, 0]:.0f} stands on line {lines[k]} already."
-        )
+        raise InputError(f"{path}, line {lines[k + 1]}: atom id {values[k, 0]:.0f} stands on line {lines[k]} already.")
     return Packing(values[:, 1:4], values[:, 4], box, Source(path, lines))

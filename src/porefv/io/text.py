@@ -115,9 +115,7 @@ class Rows:
         lines = np.array(numbers)
         if all(_number_of_cells(text, delimiter) == cells for text in texts):
             try:
-                fast = np.loadtxt(
-                    texts, delimiter=delimiter, usecols=wanted, comments=None, quotechar='"', ndmin=2
-                )
+                fast = np.loadtxt(texts, delimiter=delimiter, usecols=wanted, comments=None, quotechar='"', ndmin=2)
                 return fast, lines
             except ValueError:
                 pass  # some cell is not a number: find out which
@@ -125,9 +123,7 @@ class Rows:
         for row, (text, number) in enumerate(zip(texts, numbers, strict=True)):
             found = split(text, delimiter)
             if len(found) != cells:
-                raise InputError(
-                    f"{self.path}, line {number}: {len(found)} cells instead of {cells}: {quoted(text)}."
-                )
+                raise InputError(f"{self.path}, line {number}: {len(found)} cells instead of {cells}: {quoted(text)}.")
             for column, (name, position) in enumerate(columns.items()):
                 values[row, column] = self._number(found[position], name, number)
         return values, lines
@@ -141,9 +137,7 @@ class Rows:
             if not cell.strip():
                 raise InputError(f"{self.path}, line {line}: the cell of '{name}' is empty.") from None
             hint = " Write decimals with a point." if "," in cell else ""
-            raise InputError(
-                f"{self.path}, line {line}: {name} is {quoted(cell)}, not a number.{hint}"
-            ) from None
+            raise InputError(f"{self.path}, line {line}: {name} is {quoted(cell)}, not a number.{hint}") from None
 
 
 def split(text: str, delimiter: str | None) -> list[str]:

@@ -26,9 +26,7 @@ _TYPES = {
 _TYPE = rf"(?P<type>{'|'.join(_TYPES)})".encode()
 
 # An array of point data is SCALARS (one component if none are given) or, like field data, part of a FIELD.
-_SCALARS = (
-    rb"^SCALARS +(?P<name>[!-~]+) +" + _TYPE + rb"(?: +(?P<components>\d{1,15}))? *\r?\nLOOKUP_TABLE .*\n"
-)
+_SCALARS = rb"^SCALARS +(?P<name>[!-~]+) +" + _TYPE + rb"(?: +(?P<components>\d{1,15}))? *\r?\nLOOKUP_TABLE .*\n"
 _FIELD = rb"^(?P<name>[!-~]+) +(?P<components>\d{1,15}) +(?P<tuples>\d{1,15}) +" + _TYPE + rb" *\r?\n"
 
 
@@ -87,9 +85,7 @@ class _Arrays(Mapping[str, NDArray[np.float64]]):
         return len(self._found)
 
 
-def _numbers(
-    path: AnyPath, content: bytes, name: str, keywords: re.Match[bytes], size: int
-) -> NDArray[np.float64]:
+def _numbers(path: AnyPath, content: bytes, name: str, keywords: re.Match[bytes], size: int) -> NDArray[np.float64]:
     """The numbers that follow the keywords of an array."""
     binary = content.split(b"\n", 3)[2].strip().upper() == b"BINARY"
     dtype = np.dtype(_TYPES[keywords["type"].decode()])

@@ -93,8 +93,10 @@ def insert(
                     if marks[u] == stamp:
                         continue
                     if marks[u] != -stamp:
-                        f = hq - planes[u, 3] - (
-                            planes[u, 0] * points[q, 0] + planes[u, 1] * points[q, 1] + planes[u, 2] * points[q, 2]
+                        f = (
+                            hq
+                            - planes[u, 3]
+                            - (planes[u, 0] * points[q, 0] + planes[u, 1] * points[q, 1] + planes[u, 2] * points[q, 2])
                         )
                         if abs(f) > bounds[u]:
                             inside = f < 0.0
@@ -119,9 +121,9 @@ def insert(
             i = rim_facets[b]
             if state[0] > 0:
                 state[0] -= 1
-                new = free[state[0]]
+                new = np.int64(free[state[0]])
             else:
-                new = np.int32(state[1])
+                new = state[1]
                 state[1] += 1
             for j in range(4):
                 cells[new, j] = cells[c, j]
@@ -148,7 +150,7 @@ def insert(
                     continue
                 current = c
                 out = j
-                pivot = np.int64(i)
+                pivot = int(i)
                 while True:
                     u = neighbours[current, out]
                     if u < 0 or marks[u] != stamp:
@@ -231,9 +233,7 @@ def _place(t, q, n, points, weights, cells, planes, bounds, extent, magnitude):
             u = (axis + 1) % 3
             v = (axis + 2) % 3
             value = (
-                ha * (b[u] * c[v] - b[v] * c[u])
-                + hb * (c[u] * a[v] - c[v] * a[u])
-                + hc * (a[u] * b[v] - a[v] * b[u])
+                ha * (b[u] * c[v] - b[v] * c[u]) + hb * (c[u] * a[v] - c[v] * a[u]) + hc * (a[u] * b[v] - a[v] * b[u])
             )
             permanent = (
                 ta * (abs(b[u] * c[v]) + abs(b[v] * c[u]))
@@ -262,5 +262,6 @@ def _place(t, q, n, points, weights, cells, planes, bounds, extent, magnitude):
 @njit(cache=True)
 def _grown(array):
     larger = np.empty(2 * array.shape[0], array.dtype)
-    larger[: array.shape[0]] = array
+    for i in range(array.shape[0]):  # a loop compiles in a fraction of the time of a slice
+        larger[i] = array[i]
     return larger

@@ -121,7 +121,7 @@ def power_centre(cell, q, n, points, weights):
             b = others[(k + 1) % 3]
             c = others[(k + 2) % 3]
             nm = _exact_minor2(rows, b, c, u, v, minor)
-            nh = _exact_height(cell[others[k]], q, rows[others[k]], n, points, weights, height)
+            nh = _exact_height(cell[others[k]], q, rows, others[k], n, points, weights, height)
             np_ = multiply(minor, nm, height, nh, product)
             for i in range(count):
                 total[i] = numerator[i]
@@ -158,12 +158,15 @@ def _exact_rows(cell, q, n, points):
 
 
 @njit(cache=True)
-def _entry(pair, out):
+def _entry(low, high, out):
+    """The expansion low + high."""
     n = 0
-    for x in pair:
-        if x != 0.0:
-            out[n] = x
-            n += 1
+    if low != 0.0:
+        out[n] = low
+        n += 1
+    if high != 0.0:
+        out[n] = high
+        n += 1
     return n
 
 
@@ -174,8 +177,12 @@ def _exact_minor2(rows, j, k, u, v, out):
     y = np.empty(2)
     left = np.empty(8)
     right = np.empty(8)
-    nl = multiply(x, _entry(rows[j, u], x), y, _entry(rows[k, v], y), left)
-    nr = multiply(x, _entry(rows[j, v], x), y, _entry(rows[k, u], y), right)
+    nx = _entry(rows[j, u, 0], rows[j, u, 1], x)
+    ny = _entry(rows[k, v, 0], rows[k, v, 1], y)
+    nl = multiply(x, nx, y, ny, left)
+    nx = _entry(rows[j, v, 0], rows[j, v, 1], x)
+    ny = _entry(rows[k, u, 0], rows[k, u, 1], y)
+    nr = multiply(x, nx, y, ny, right)
     for i in range(nr):
         right[i] = -right[i]
     return add(left, nl, right, nr, out)
@@ -191,7 +198,8 @@ def _exact_minor(rows, j, k, m, out):
     count = 0
     for axis in range(3):
         nm = _exact_minor2(rows, k, m, (axis + 1) % 3, (axis + 2) % 3, minor)
-        np_ = multiply(minor, nm, x, _entry(rows[j, axis], x), product)
+        nx = _entry(rows[j, axis, 0], rows[j, axis, 1], x)
+        np_ = multiply(minor, nm, x, nx, product)
         for i in range(count):
             total[i] = out[i]
         count = add(total, count, product, np_, out)
@@ -199,8 +207,8 @@ def _exact_minor(rows, j, k, m, out):
 
 
 @njit(cache=True)
-def _exact_height(v, q, a, n, points, weights, out):
-    """H_k (at most 24 components)."""
+def _exact_height(v, q, rows, k, n, points, weights, out):
+    """H_k of vertex v in row k (at most 24 components)."""
     term = np.empty(2)
     total = np.empty(32)
     count = 0
@@ -208,30 +216,26 @@ def _exact_height(v, q, a, n, points, weights, out):
         # Walls are axis-aligned: d has one non-zero entry, +1 or -1, and d·c_q is exact.
         along = points[v, 0] * points[q, 0] + points[v, 1] * points[q, 1] + points[v, 2] * points[q, 2]
         high, low = two_sum(weights[v], -along)
-        term[0] = 2.0 * low
-        term[1] = 2.0 * high
-        return _entry(term, out)
+        return _entry(2.0 * low, 2.0 * high, out)
     factors = np.empty((11, 2))
     for axis in range(3):
-        low = a[axis, 0]
-        high = a[axis, 1]
+        low = rows[k, axis, 0]
+        high = rows[k, axis, 1]
         factors[3 * axis, 0] = high
         factors[3 * axis, 1] = high
         factors[3 * axis + 1, 0] = 2.0 * high
         factors[3 * axis + 1, 1] = low
         factors[3 * axis + 2, 0] = low
         factors[3 * axis + 2, 1] = low
-    factors[9, :] = weights[q]
+    factors[9, 0] = weights[q]
+    factors[9, 1] = weights[q]
     factors[10, 0] = -weights[v]
     factors[10, 1] = weights[v]
-    pair = np.empty(2)
     for f in range(11):
         if factors[f, 0] == 0.0 or factors[f, 1] == 0.0:
             continue
         high, low = two_product(factors[f, 0], factors[f, 1])
-        pair[0] = low
-        pair[1] = high
-        nt = _entry(pair, term)
+        nt = _entry(low, high, term)
         for i in range(count):
             total[i] = out[i]
         count = add(total, count, term, nt, out)
@@ -249,7 +253,7 @@ def _exact_conflict(cell, q, n, points, weights):
     for k in range(4):
         i, j, m = _others(k)
         nm = _exact_minor(rows, i, j, m, minor)
-        nh = _exact_height(cell[k], q, rows[k], n, points, weights, height)
+        nh = _exact_height(cell[k], q, rows, k, n, points, weights, height)
         counts[k] = multiply(minor, nm, height, nh, products[k])
         if k % 2 == 0:
             for c in range(counts[k]):

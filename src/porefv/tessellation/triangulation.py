@@ -123,9 +123,7 @@ def _build(order, n, points, weights, extent):
     state = np.zeros(4, np.int64)
     magnitude = float(np.sum(np.abs(points[:n]).max(axis=0) ** 2) + weights[:n].max() ** 2)
     magnitude += float(np.abs(weights[n:]).max()) ** 2
-    insertion.start(
-        order[0], n, points, weights, cells, neighbours, planes, bounds, free, state, extent, magnitude
-    )
+    insertion.start(order[0], n, points, weights, cells, neighbours, planes, bounds, free, state, extent, magnitude)
     done = 1
     while True:
         done = insertion.insert(
@@ -135,8 +133,7 @@ def _build(order, n, points, weights, extent):
         if done == n:
             break
         cells, neighbours, planes, bounds, marks, ends, free = (
-            np.concatenate([a, np.zeros_like(a)])
-            for a in (cells, neighbours, planes, bounds, marks, ends, free)
+            np.concatenate([a, np.zeros_like(a)]) for a in (cells, neighbours, planes, bounds, marks, ends, free)
         )
     used = state[1]
     return cells[:used], neighbours[:used], planes[:used]
