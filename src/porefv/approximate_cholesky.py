@@ -3,8 +3,8 @@
 Eliminating a node joins all its neighbours to each other. Instead of that clique a random tree with the same mean
 is added, each neighbour linked to one of the more strongly joined ones with probability in proportion to its link.
 The factor stays nearly as sparse as the network, for any geometry, size and contrast, and as a preconditioner takes
-conjugate gradients to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016, doi:10.1109/FOCS.2016.68;
-Gao, Kyng and Spielman 2023, arXiv:2303.00709). The random numbers are seeded: equal networks have equal factors.
+conjugate gradients to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016,
+doi:10.1109/FOCS.2016.68; Gao, Kyng and Spielman 2023, arXiv:2303.00709). The random numbers are seeded: equal networks have equal factors.
 """
 
 from __future__ import annotations

@@ -47,8 +47,8 @@ fipy = _import_fipy()
 class FipyPoreMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     """Pores as the cells of a genuine FiPy mesh.
 
-    Cells are the pores that are not held, in order; faces are facets between different pores, and the pores' faces on the
-    walls. Facets towards held pores are exterior faces, at the distance L, to `constrain` a variable on.
+    Cells are the pores that are not held, in order; faces are facets between different pores, and the pores' faces
+    on the walls. Facets towards held pores are exterior faces, at the distance L, to `constrain` a variable on.
 
     Parameters
     ----------
@@ -67,10 +67,10 @@ class FipyPoreMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
 
     Notes
     -----
-    A pore's cell centre, which FiPy uses to orient faces and to interpolate, is the mean of its faces' centres; the pressure of
-    design lives at the Laguerre vertex. Only terms that need no more than face areas, normals, cell volumes and
-    distances, diffusion, transients and sources among them, are second to none here. FiPy's cell volume is the whole
-    cell's, solid included: scale a source per void volume with `mesh.pore_volumes[pores]`.
+    FiPy's cell centre is the mean of a pore's face centres; its pressure lives at the Laguerre vertex. Terms that use
+    face areas, normals, cell volumes and cell distances (diffusion, transients, sources) are exact; interpolation to
+    faces uses the cell centres and is not. FiPy's cell volume is the whole cell's, solid included: scale a source
+    per void volume with `pore_mesh.pore_volumes[pores]`.
     """
 
     def __init__(self, mesh: PoreMesh, held: np.ndarray | None = None):

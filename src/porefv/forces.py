@@ -20,9 +20,9 @@ class Forces:
     pressure, viscous, buoyancy : (n, 3) arrays
         On each sphere: C12 eq. 14, eq. 17-18, and the weight of the fluid displaced, -ρ V g.
     wall_pressure, wall_viscous, wall_buoyancy : (6, 3) arrays
-        On each wall, in the order x_min, x_max, y_min, ...: the piezometric pressure on it, the drag along it, and the hydrostatic
-        pressure on it (zero at the highest corner of the box). Walls of imposed pressure are open: none but the
-        hydrostatic part.
+        On each wall, in the order x_min, x_max, y_min, ...: the piezometric pressure on it, the drag along it, and
+        the hydrostatic pressure on it (zero at the highest corner of the box). Walls of imposed pressure are open:
+        they bear none but the hydrostatic part.
     thrust : (3,) array
         Force of the imposed pressures on the ends of the sample: what all pressure and viscous forces add up to.
     scale : float

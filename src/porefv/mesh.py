@@ -58,8 +58,8 @@ class PoreMesh:
     box : Box, optional
         Replaces the packing's own box.
     unite_tolerance : float
-        Cells whose Laguerre vertices are closer than this fraction of the smallest sphere radius of the facet between them
-        are one pore: the facet has next to no length to resist flow along. 0 unites exact ties only.
+        Cells whose Laguerre vertices are closer than this fraction of the smallest sphere radius of the facet
+        between them are one pore: there is next to no length to resist flow along. 0 unites exact ties only.
     wall_tolerance : float
         Largest fraction of its radius by which a sphere may cross a wall.
 

@@ -53,8 +53,8 @@ def solve_network(
         Imposed pressures, NaN where free [Pa].
     links : (t,) array, optional
         Positive weights by which pores without any flowing path to an imposed pressure take theirs from their
-        neighbours (equal weights by default). Nothing flows there: the rule only keeps their pressure, which the flow leaves
-        open, within that of their surroundings.
+        neighbours (equal weights by default). Nothing flows there: the rule only keeps their pressure, which the
+        flow leaves open, within that of their surroundings.
     sources : (n_pores,) array, optional
         Volume injected into each free pore per unit time [m³/s].
     solver, tolerance

@@ -57,8 +57,8 @@ def solve(
     rhs : (n,) array
         Flux into each node: held pressures times their links, and sources [m³/s].
     solver : {'auto', 'direct', 'cg'}
-        `direct`: sparse factorisation (SuperLU, minimum degree). `cg`: conjugate gradients with an approximate Cholesky factor.
-        `auto`: `direct` up to `DIRECT_LIMIT` unknowns, else `cg`.
+        `direct`: sparse factorisation (SuperLU, minimum degree). `cg`: conjugate gradients with an approximate
+        Cholesky factor. `auto`: `direct` up to `DIRECT_LIMIT` unknowns, else `cg`.
     tolerance : float
         Bound on the imbalance (see `SolverReport`). Where rounding does not allow it, its floor counts.
 
@@ -108,7 +108,9 @@ def _direct(network: Network, rhs: np.ndarray, tolerance: float) -> tuple[np.nda
     matrix = (scale @ network.to_matrix() @ scale).tocsc()
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     x = scale @ factor.solve(scale @ rhs)
-    for refinements in range(1, 4):
+    refinements = 0
+    while refinements < 3:
+        refinements += 1
         flow, floor = _scales(network, rhs, x)
         lost = network.residual(rhs, x)
         if np.abs(lost).sum() <= max(tolerance * flow, floor):

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class Throats:
     """Throats of a mesh: one row per Laguerre edge between two pores, dual to one facet.
 
-    Facets that share their Laguerre edge (the triangles into which a tie cuts a polygon) are one throat. Facets inside a
-    united pore belong to no throat. Geometry that needs solid angles is computed only when asked for.
+    Facets that share their Laguerre edge (the triangles into which a tie cuts a polygon) are one throat. Facets
+    inside a united pore belong to no throat. Geometry that needs solid angles is computed only when asked for.
 
     Parameters
     ----------
@@ -25,8 +25,9 @@ class Throats:
 
     Notes
     -----
-    Signed values make the sums over all facets exact: Σφ is the void volume, Σγ^k the free surface of sphere k. Where
-    spheres overlap, or a throat is nearly closed, single values of φ, γ or A^f may be zero or negative: such throats carry no flow, and are counted.
+    Signed values make the sums over all facets exact: Σφ is the void volume, Σγ^k the free surface of sphere k.
+    Where spheres overlap, or a throat is nearly closed, single values of φ, γ or A^f may be zero or negative: such
+    throats carry no flow, and are counted.
     """
 
     def __init__(self, mesh: PoreMesh):
@@ -89,7 +90,7 @@ class Throats:
 
     @cached_property
     def _groups(self) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray]:
-        """(throat of each facet or -1, sense of those with a throat, first facet of each throat); None where trivial."""
+        """(throat of each facet or -1, sense of those that have one, first facet of each); None where trivial."""
         mesh = self.mesh
         if mesh.n_united == 0:
             return None, None, np.arange(len(mesh.facet_cells))
