@@ -1,10 +1,10 @@
-"""How long each stage takes, everything asked; and beside it Yade's FlowEngine on the same packings, if it is installed.
+"""How long each stage takes, everything asked; beside it Yade's FlowEngine on the same packings, if installed.
 
     python benchmarks/stages.py [--repeat 3] [--no-yade] [SCENE.toml ...]
 
-Kernels are compiled and loaded before the clock starts. Times are medians, and comparisons are ratios within one
-run: machines differ. Yade (https://yade-dem.org) is used as the executable `yade`, if there is one on the PATH. Its first
-step triangulates, computes conductances, solves and sums up forces, and so does the row "triangulation to forces" here.
+Kernels are compiled and loaded before the clock starts. Times are medians, and comparisons are ratios within one run:
+machines differ. Yade (https://yade-dem.org) is used as the executable `yade`, if there is one on the PATH. Its first
+step triangulates, computes conductances, solves and sums up forces: the same as "triangulation to forces" here.
 """
 
 from __future__ import annotations
@@ -130,9 +130,7 @@ def run_yade(executable: str, scene: Scene) -> tuple[dict[str, float], float]:
 
 def elsewhere(scene: Scene, folder: str) -> Scene:
     """The scene with its results in another folder."""
-    return dataclasses.replace(
-        scene, output=dataclasses.replace(scene.output, directory=Path(folder) / "results")
-    )
+    return dataclasses.replace(scene, output=dataclasses.replace(scene.output, directory=Path(folder) / "results"))
 
 
 def median(runs: list[tuple[dict[str, float], float]]) -> tuple[dict[str, float], float]:

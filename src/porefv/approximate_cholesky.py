@@ -4,63 +4,212 @@ Eliminating a node joins all its neighbours to each other. Instead of that cliqu
 is added, each neighbour linked to one of the more strongly joined ones with probability in proportion to its link.
 The factor stays nearly as sparse as the network, for any geometry, size and contrast, and as a preconditioner takes
 conjugate gradients to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016,
-doi:10.1109/FOCS.2016.68; Gao, Kyng and Spielman 2023, arXiv:2303.00709). The random numbers are seeded: equal networks have equal factors.
+doi:10.1109/FOCS.2016.68; Gao, Kyng and Spielman 2023, arXiv:2303.00709).
+
+Large networks are cut into parts along their numbering, which the mesh lays along a space-filling curve. The inner
+nodes of all parts are eliminated side by side, then the separator between them. The cut depends on the size alone
+and the random numbers are seeded: equal networks have equal factors, on any number of threads.
 """
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
 import numpy as np
-from numba import njit
+from numba import get_num_threads, njit, prange
 
 from porefv.network import Network
 
 _GROUND = -1
+# Nodes from which two parts pay, and the size beyond which there are more of them.
+_CUT_FROM = 20_000
+_PART = 400_000
 
 
+@dataclass(frozen=True, eq=False)
 class ApproximateCholesky:
     """Preconditioner A ≈ L D Lᵀ of a network.
 
-    Parameters
+    Positions run over the inner nodes of each part in their order of elimination, then over the separator's.
+
+    Attributes
     ----------
-    network : Network
-        Every part of it must be joined to a leak.
+    order : (n,) int32 array
+        Node at each position.
+    parts : (p + 1,) int64 array
+        Position where each part starts; the last is where the separator starts.
+    starts : (n + 1,) int64, rows : (fill,) int32, factors : (fill,) float32 arrays
+        Column k of -L below its unit diagonal.
+    pivots : (n,) array
+        D.
     """
 
-    def __init__(self, network: Network):
-        self.order, self.starts, rows, self.factors, self.pivots = eliminate(
-            network.starts, network.columns, network.links, network.leaks
-        )
-        position = np.empty(len(network), np.int32)
-        position[self.order] = np.arange(len(network), dtype=np.int32)
-        self.rows = position[rows]
-        self.work = np.empty(len(network))
+    order: np.ndarray
+    parts: np.ndarray
+    starts: np.ndarray
+    rows: np.ndarray
+    factors: np.ndarray
+    pivots: np.ndarray
 
-    @property
-    def fill(self) -> int:
-        """Number of entries below the diagonal of the factor."""
-        return len(self.factors)
+    @classmethod
+    def of(cls, network: Network) -> ApproximateCholesky:
+        """Factor a network, every part of which must be joined to a leak."""
+        n = len(network)
+        n_parts = 1 if n < _CUT_FROM else 2 * (1 + n // (2 * _PART))
+        bounds = np.linspace(0, n, n_parts + 1).astype(np.int64)
+        separator = _separator(network.starts, network.columns, bounds)
+        local = np.empty(n, np.int32)
+
+        def factor(part):
+            inner, outer, starts, columns, links, leaks = _part(
+                network.starts, network.columns, network.links, network.leaks, separator, local,
+                bounds[part], bounds[part + 1],
+            )  # fmt: skip
+            order, *column, kept, strengths, ground = eliminate(starts, columns, links, leaks, len(inner))
+            starts, rows, factors, pivots = column
+            nodes = np.concatenate([inner, outer])
+            return inner[order], starts, nodes[rows], factors, pivots, nodes[kept], strengths, outer, ground
+
+        with ThreadPoolExecutor(get_num_threads()) as pool:
+            pieces = list(pool.map(factor, range(n_parts)))
+        pieces.append(cls._separator_piece(network, separator, pieces))
+
+        order = np.concatenate([piece[0] for piece in pieces])
+        position = np.empty(n, np.int32)
+        position[order] = np.arange(n, dtype=np.int32)
+        fills = np.cumsum([0] + [len(piece[2]) for piece in pieces])
+        return cls(
+            order,
+            np.cumsum([0] + [len(piece[0]) for piece in pieces[:-1]]),
+            np.concatenate([piece[1][:-1] + fill for piece, fill in zip(pieces, fills, strict=False)] + [fills[-1:]]),
+            np.concatenate([position[piece[2]] for piece in pieces]),
+            np.concatenate([piece[3] for piece in pieces]),
+            np.concatenate([piece[4] for piece in pieces]),
+        )
+
+    @staticmethod
+    def _separator_piece(network, separator, pieces):
+        """Factor of what the parts leave: links between separator nodes, given and filled in."""
+        nodes = np.flatnonzero(separator >= 0).astype(np.int32)
+        leaks = network.leaks[nodes]
+        for piece in pieces:
+            leaks[separator[piece[7]]] += piece[8]
+        given = _links_within(network.starts, network.columns, network.links, separator, nodes)
+        pairs = np.concatenate([given[0]] + [separator[piece[5]] for piece in pieces])
+        strengths = np.concatenate([given[1]] + [piece[6] for piece in pieces])
+        rest = Network.from_links(pairs, strengths, leaks)
+        order, starts, rows, factors, pivots, *_ = eliminate(
+            rest.starts, rest.columns, rest.links, rest.leaks, len(rest)
+        )
+        return nodes[order], starts, nodes[rows], factors, pivots
 
     def apply(self, r: np.ndarray) -> np.ndarray:
         """(n,): (L D Lᵀ)⁻¹ r."""
         z = np.empty_like(r)
-        substitute(self.order, self.starts, self.rows, self.factors, self.pivots, r, self.work, z)
+        substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z)
         return z
 
 
 @njit(cache=True)
-def eliminate(starts, columns, links, leaks):
-    """Eliminate all nodes, the least connected first, in sweeps along the numbering.
+def _separator(starts, columns, bounds):
+    """Number of each node in the separator, -1 outside: the nodes linked to a later part."""
+    number = np.full(bounds[-1], -1, np.int32)
+    count = 0
+    for part in range(bounds.shape[0] - 2):
+        for i in range(bounds[part], bounds[part + 1]):
+            for k in range(starts[i], starts[i + 1]):
+                if columns[k] >= bounds[part + 1]:
+                    number[i] = count
+                    count += 1
+                    break
+    return number
 
-    Links live in lists of half-links, one list a node; a half-link whose other end is gone is dropped when met.
+
+@njit(cache=True, nogil=True)
+def _part(starts, columns, links, leaks, separator, local, first, last):
+    """One part as a network of its own: inner nodes first, then the separator's nodes next to them.
 
     Returns
     -------
-    order (n,), starts (n + 1,), rows, factors: column k of -L holds `factors` at the nodes `rows`; pivots (n,).
+    inner, outer : node ids;  starts, columns, links : rows of the inner nodes;  leaks : of both, zero for the outer.
     """
-    n = leaks.shape[0]
+    inner = np.empty(last - first, np.int32)
+    n_inner = 0
+    n_links = 0
+    for i in range(first, last):
+        if separator[i] < 0:
+            local[i] = n_inner
+            inner[n_inner] = i
+            n_inner += 1
+            n_links += starts[i + 1] - starts[i]
+    outer = np.empty(n_links, np.int32)
+    n_outer = 0
+    seen = np.full(separator.max() + 1, -1, np.int32)
+    new_starts = np.zeros(n_inner + 1, np.int64)
+    new_columns = np.empty(n_links, np.int32)
+    new_links = np.empty(n_links)
+    filled = 0
+    for a in range(n_inner):
+        i = inner[a]
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            s = separator[j]
+            if s < 0:
+                new_columns[filled] = local[j]
+            else:
+                if seen[s] < 0:
+                    seen[s] = n_outer
+                    outer[n_outer] = j
+                    n_outer += 1
+                new_columns[filled] = n_inner + seen[s]
+            new_links[filled] = links[k]
+            filled += 1
+        new_starts[a + 1] = filled
+    new_leaks = np.zeros(n_inner + n_outer)
+    for a in range(n_inner):
+        new_leaks[a] = leaks[inner[a]]
+    return inner[:n_inner].copy(), outer[:n_outer].copy(), new_starts, new_columns, new_links, new_leaks
+
+
+@njit(cache=True)
+def _links_within(starts, columns, links, separator, nodes):
+    """Links (m, 2), (m,) between nodes of the separator, in its numbering."""
+    room = 0
+    for a in range(nodes.shape[0]):
+        room += starts[nodes[a] + 1] - starts[nodes[a]]
+    pairs = np.empty((room, 2), np.int32)
+    strengths = np.empty(room)
+    count = 0
+    for a in range(nodes.shape[0]):
+        for k in range(starts[nodes[a]], starts[nodes[a] + 1]):
+            b = separator[columns[k]]
+            if b > a:
+                pairs[count, 0] = a
+                pairs[count, 1] = b
+                strengths[count] = links[k]
+                count += 1
+    return pairs[:count].copy(), strengths[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def eliminate(starts, columns, links, leaks, n):
+    """Eliminate the first n nodes, the least connected first, in sweeps along the numbering.
+
+    Links live in lists of half-links, one list for each of these nodes; a half-link whose other end is gone is
+    dropped when met. Nodes from n on are kept: fill between two of them is given back.
+
+    Returns
+    -------
+    order (n,), starts (n + 1,), rows, factors : column k of -L holds `factors` at the nodes `rows`
+    pivots (n,)
+    kept (m, 2), strengths (m,) : links between kept nodes that elimination has left
+    ground : leaks of the kept nodes
+    """
     np.random.seed(0)
-    # Each elimination frees as many half-links as it makes, so the initial room suffices.
-    room = columns.shape[0]
+    n_all = leaks.shape[0]
+    # Each elimination frees about as many half-links as it makes, so the initial room nearly suffices.
+    room = columns.shape[0] + 64
     head = np.full(n, -1, np.int64)
     following = np.empty(room, np.int64)
     other = np.empty(room, np.int32)
@@ -78,16 +227,19 @@ def eliminate(starts, columns, links, leaks):
             degree[i] += 1
     unused = np.int64(-1)
 
-    done = np.zeros(n, np.bool_)
-    slot = np.full(n, -1, np.int32)
+    done = np.zeros(n_all, np.bool_)
+    slot = np.full(n_all, -1, np.int32)
     near = np.empty(64, np.int32)
     w = np.empty(64)
     order = np.empty(n, np.int32)
     pivots = np.empty(n)
     factor_starts = np.zeros(n + 1, np.int64)
-    rows = np.empty(2 * room + 64, np.int32)
-    factors = np.empty(2 * room + 64)
+    rows = np.empty(2 * room, np.int32)
+    factors = np.empty(2 * room, np.float32)
     filled = 0
+    kept = np.empty((64, 2), np.int32)
+    strengths = np.empty(64)
+    n_kept = 0
     eliminated = 0
     limit = 3
     while eliminated < n:
@@ -111,15 +263,15 @@ def eliminate(starts, columns, links, leaks):
                         near[m] = j
                         w[m] = weight[link]
                         m += 1
-                    degree[j] -= 1
+                    if j < n:
+                        degree[j] -= 1
                 after = following[link]
                 following[link] = unused
                 unused = link
                 link = after
-            for q in range(m):
-                slot[near[q]] = -1
             total = ground[i]
             for q in range(m):
+                slot[near[q]] = -1
                 total += w[q]
             done[i] = True
             order[eliminated] = i
@@ -166,9 +318,19 @@ def eliminate(starts, columns, links, leaks):
                     ground[b] += strength
                 elif b == _GROUND:
                     ground[a] += strength
+                elif a >= n and b >= n:
+                    if n_kept == strengths.shape[0]:
+                        kept = _doubled_pairs(kept)
+                        strengths = _doubled(strengths)
+                    kept[n_kept, 0] = a
+                    kept[n_kept, 1] = b
+                    strengths[n_kept] = strength
+                    n_kept += 1
                 else:
                     for end in range(2):
                         x = a if end == 0 else b
+                        if x >= n:
+                            continue
                         link = unused
                         if link >= 0:
                             unused = following[link]
@@ -177,7 +339,7 @@ def eliminate(starts, columns, links, leaks):
                                 following = _doubled(following)
                                 other = _doubled(other)
                                 weight = _doubled(weight)
-                            link = used
+                            link = np.int64(used)
                             used += 1
                         following[link] = head[x]
                         head[x] = link
@@ -186,25 +348,53 @@ def eliminate(starts, columns, links, leaks):
                         degree[x] += 1
         if eliminated - before < 0.05 * (n - before):
             limit = max(limit + 1, limit * 5 // 4)
-    return order, factor_starts, rows[:filled].copy(), factors[:filled].copy(), pivots
+    return (
+        order, factor_starts, rows[:filled].copy(), factors[:filled].copy(), pivots,
+        kept[:n_kept].copy(), strengths[:n_kept].copy(), ground[n:].copy(),
+    )  # fmt: skip
 
 
-@njit(cache=True)
-def substitute(order, starts, rows, factors, pivots, r, y, z):
-    """z = (L D Lᵀ)⁻¹ r; y is working room."""
+@njit(cache=True, parallel=True)
+def substitute(order, parts, starts, rows, factors, pivots, r, z):
+    """z = (L D Lᵀ)⁻¹ r."""
     n = order.shape[0]
-    for k in range(n):
+    n_parts = parts.shape[0] - 1
+    n_inner = parts[n_parts]
+    y = np.empty(n)
+    shares = np.zeros((n_parts, n - n_inner))
+    for part in prange(n_parts):
+        first = parts[part]
+        last = parts[part + 1]
+        for k in range(first, last):
+            y[k] = r[order[k]]
+        for k in range(first, last):
+            v = y[k]
+            for e in range(starts[k], starts[k + 1]):
+                if rows[e] < n_inner:
+                    y[rows[e]] += factors[e] * v
+                else:
+                    shares[part, rows[e] - n_inner] += factors[e] * v
+    for k in range(n_inner, n):
         y[k] = r[order[k]]
-    for k in range(n):
+        for part in range(n_parts):
+            y[k] += shares[part, k - n_inner]
+    for k in range(n_inner, n):
         v = y[k]
         for e in range(starts[k], starts[k + 1]):
             y[rows[e]] += factors[e] * v
-    for k in range(n - 1, -1, -1):
+    for k in range(n - 1, n_inner - 1, -1):
         s = y[k] / pivots[k]
         for e in range(starts[k], starts[k + 1]):
             s += factors[e] * y[rows[e]]
         y[k] = s
         z[order[k]] = s
+    for part in prange(n_parts):
+        for k in range(parts[part + 1] - 1, parts[part] - 1, -1):
+            s = y[k] / pivots[k]
+            for e in range(starts[k], starts[k + 1]):
+                s += factors[e] * y[rows[e]]
+            y[k] = s
+            z[order[k]] = s
 
 
 @njit(cache=True)
@@ -212,4 +402,13 @@ def _doubled(array):
     larger = np.empty(2 * array.shape[0], array.dtype)
     for i in range(array.shape[0]):
         larger[i] = array[i]
+    return larger
+
+
+@njit(cache=True)
+def _doubled_pairs(array):
+    larger = np.empty((2 * array.shape[0], 2), array.dtype)
+    for i in range(array.shape[0]):
+        larger[i, 0] = array[i, 0]
+        larger[i, 1] = array[i, 1]
     return larger

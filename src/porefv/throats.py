@@ -89,79 +89,80 @@ class Throats:
     # ---- from facets to throats ---------------------------------------------------------------------------------
 
     @cached_property
-    def _groups(self) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray]:
-        """(throat of each facet or -1, sense of those that have one, first facet of each); None where trivial."""
-        mesh = self.mesh
-        if mesh.n_united == 0:
-            return None, None, np.arange(len(mesh.facet_cells))
-        passes = np.flatnonzero(np.not_equal(*mesh.cell_pore[mesh.facet_cells].T))
-        throat = np.full(len(mesh.facet_cells), -1)
-        if mesh.cell_node.max() + 1 < mesh.n_cells:  # there are ties
-            nodes = mesh.cell_node[mesh.facet_cells[passes]].astype(np.int64)
-            low, high = nodes.min(axis=1), nodes.max(axis=1)
-            _, first, throat[passes] = np.unique(low * mesh.n_cells + high, return_index=True, return_inverse=True)
-            sense = np.where(nodes[:, 0] == nodes[first[throat[passes]], 0], 1.0, -1.0)
-            return throat, sense, passes[first]
-        throat[passes] = np.arange(len(passes))
-        return throat, None, passes
-
-    @property
     def first_facets(self) -> np.ndarray:
-        """(t,): a facet of each throat, of the same sense."""
-        return self._groups[2]
+        """(t,): a facet of each throat; the throat takes its sense."""
+        first = np.not_equal(*self.mesh.cell_pore[self.mesh.facet_cells].T)
+        first[self._further[0]] = False
+        return np.flatnonzero(first)
 
-    @property
+    @cached_property
+    def _further(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The further facets of throats that a tie has cut in several: their ids, first facets and senses."""
+        mesh = self.mesh
+        tied = np.bincount(mesh.cell_node) > 1
+        if not tied.any():
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+        nodes = mesh.cell_node[mesh.facet_cells]
+        # Only between two Laguerre vertices that are both tied can there be more facets than one.
+        several = np.flatnonzero(tied[nodes].all(axis=1) & np.not_equal(*mesh.cell_pore[mesh.facet_cells].T))
+        nodes = nodes[several].astype(np.int64)
+        keys = nodes.min(axis=1) * mesh.n_cells + nodes.max(axis=1)
+        _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+        first = first[inverse]
+        further = np.flatnonzero(first != np.arange(len(several)))
+        sense = np.where(nodes[further, 0] == nodes[first[further], 0], 1.0, -1.0)
+        return several[further], several[first[further]], sense
+
+    @cached_property
     def facet_throat(self) -> np.ndarray:
-        """(f,): throat of each facet, -1 inside a united pore."""
-        throat = self._groups[0]
-        return np.arange(len(self)) if throat is None else throat
-
-    def _first(self, values: np.ndarray) -> np.ndarray:
-        return values if self._groups[0] is None else values[self._groups[2]]
+        """(f,) int: throat of each facet, -1 inside a united pore."""
+        throat = np.full(len(self.mesh.facet_cells), -1)
+        throat[self.first_facets] = np.arange(len(self))
+        further, first, _ = self._further
+        throat[further] = throat[first]
+        return throat
 
     def _total(self, values: np.ndarray) -> np.ndarray:
-        throat = self._groups[0]
-        if throat is None:
-            return values
-        passes = throat >= 0
-        return np.bincount(throat[passes], values[passes], len(self))
+        """(t,): sum of facet values (f,) over each throat."""
+        return self.total_by_facet(values)[self.first_facets]
 
     def total_by_facet(self, values: np.ndarray) -> np.ndarray:
-        """(f,): each facet's share widened to the total over its throat (itself inside a united pore)."""
-        throat = self._groups[0]
-        if throat is None:
+        """(f,): sum of facet values over each facet's throat."""
+        further, first, _ = self._further
+        if len(further) == 0:
             return values
-        return np.where(throat >= 0, self._total(values)[throat], values)
+        totals = values.copy()
+        np.add.at(totals, first, values[further])
+        totals[further] = totals[first]
+        return totals
 
     def total_vectors(self, vectors: np.ndarray) -> np.ndarray:
-        """(f, 3): sum of facet vectors (along facet normals) over each facet's throat, in the facet's own sense."""
-        throat, sense, _ = self._groups
-        if throat is None or sense is None:
+        """(f, 3): sum of facet vectors, along facet normals, over each facet's throat, in the facet's own sense."""
+        further, first, sense = self._further
+        if len(further) == 0:
             return vectors
-        passes = np.flatnonzero(throat >= 0)
-        along = sense[:, None] * vectors[passes]
-        sums = np.stack([np.bincount(throat[passes], column, len(self)) for column in along.T], axis=1)
         totals = vectors.copy()
-        totals[passes] = sense[:, None] * sums[throat[passes]]
+        np.add.at(totals, first, sense[:, None] * vectors[further])
+        totals[further] = sense[:, None] * totals[first]
         return totals
 
     def __len__(self) -> int:
-        return len(self._groups[2])
+        return len(self.first_facets)
 
     @cached_property
     def pores(self) -> np.ndarray:
         """(t, 2) int32: the two pores of each throat."""
-        return self.mesh.cell_pore[self.mesh.facet_cells[self._groups[2]]]
+        return self.mesh.cell_pore[self.mesh.facet_cells[self.first_facets]]
 
     @cached_property
     def normals(self) -> np.ndarray:
         """(t, 3): unit normal of each throat, from its first pore to its second."""
-        return self._first(self.facet_normals)
+        return self.facet_normals[self.first_facets]
 
     @cached_property
     def lengths(self) -> np.ndarray:
         """(t,): length L of each throat, between its Laguerre vertices [m]."""
-        return self._first(self.facet_lengths)
+        return self.facet_lengths[self.first_facets]
 
     @cached_property
     def areas(self) -> np.ndarray:
@@ -197,17 +198,14 @@ class Throats:
         """
         mesh = self.mesh
         radii = inscribed_circles(mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip))
-        throat, _, first = self._groups
-        least = radii[first]
-        if throat is not None:
-            passes = throat >= 0
-            np.minimum.at(least, throat[passes], radii[passes])
-        return least
+        further, first, _ = self._further
+        np.minimum.at(radii, first, radii[further])
+        return radii[self.first_facets]
 
     def mirror_images(self, slip: np.ndarray) -> np.ndarray:
         """(t,): 1, 2 or 4: how many images of itself a throat makes up with its walls of symmetry, (6,) bool."""
         mirrors = np.concatenate([np.zeros(self.mesh.n_spheres, bool), slip])
-        return 2.0 ** mirrors[self._first(self.mesh.facet_vertices)].sum(axis=1)
+        return 2.0 ** mirrors[self.mesh.facet_vertices[self.first_facets]].sum(axis=1)
 
     @cached_property
     def closed(self) -> np.ndarray:

@@ -226,37 +226,41 @@ def _place(t, q, n, points, weights, cells, planes, bounds, extent, magnitude):
     room = abs(d) - 8.0 * EPSILON * scale
     error = np.inf
     size = 0.0
-    centre = np.empty(3)
+    x = y = z = 0.0
     if room > 0.0:
-        error = 0.0
-        for axis in range(3):
-            u = (axis + 1) % 3
-            v = (axis + 2) % 3
-            value = (
-                ha * (b[u] * c[v] - b[v] * c[u]) + hb * (c[u] * a[v] - c[v] * a[u]) + hc * (a[u] * b[v] - a[v] * b[u])
-            )
-            permanent = (
-                ta * (abs(b[u] * c[v]) + abs(b[v] * c[u]))
-                + tb * (abs(c[u] * a[v]) + abs(c[v] * a[u]))
-                + tc * (abs(a[u] * b[v]) + abs(a[v] * b[u]))
-            )
-            centre[axis] = 0.5 * value / d
-            slack = EPSILON * (8.0 * permanent + 8.0 * abs(centre[axis]) * scale) / room
-            error += slack * extent[axis]
-            size += abs(centre[axis]) * extent[axis]
+        x, px = _numerator(a[1], a[2], b[1], b[2], c[1], c[2], ha, hb, hc, ta, tb, tc)
+        y, py = _numerator(a[2], a[0], b[2], b[0], c[2], c[0], ha, hb, hc, ta, tb, tc)
+        z, pz = _numerator(a[0], a[1], b[0], b[1], c[0], c[1], ha, hb, hc, ta, tb, tc)
+        half = 0.5 / d
+        x *= half
+        y *= half
+        z *= half
+        size = abs(x) * extent[0] + abs(y) * extent[1] + abs(z) * extent[2]
+        error = (px * extent[0] + py * extent[1] + pz * extent[2] + size * scale) * 8.0 * EPSILON / room
     if not error <= _CENTRE_TOLERANCE * size:
-        exact = power_centre(cells[t], q, n, points, weights)
-        error = 0.0
-        for axis in range(3):
-            centre[axis] = exact[axis]
-            error += 8.0 * EPSILON * abs(exact[axis]) * extent[axis]
-    beta = -weights[q] * weights[q]
-    for axis in range(3):
-        p = centre[axis] + points[q, axis]
-        planes[t, axis] = 2.0 * p
-        beta += points[q, axis] * points[q, axis] - 2.0 * p * points[q, axis]
-    planes[t, 3] = beta
+        x, y, z = power_centre(cells[t], q, n, points, weights)
+        error = 8.0 * EPSILON * (abs(x) * extent[0] + abs(y) * extent[1] + abs(z) * extent[2])
+    cx = points[q, 0]
+    cy = points[q, 1]
+    cz = points[q, 2]
+    x = 2.0 * (cx + x)
+    y = 2.0 * (cy + y)
+    z = 2.0 * (cz + z)
+    planes[t, 0] = x
+    planes[t, 1] = y
+    planes[t, 2] = z
+    planes[t, 3] = cx * cx + cy * cy + cz * cz - weights[q] * weights[q] - (x * cx + y * cy + z * cz)
     bounds[t] = 2.0 * error + 32.0 * EPSILON * magnitude
+
+
+@njit(cache=True)
+def _numerator(au, av, bu, bv, cu, cv, ha, hb, hc, ta, tb, tc):
+    """One component of Σ H (a x b), and the permanent of its terms of magnitude T."""
+    value = ha * (bu * cv - bv * cu) + hb * (cu * av - cv * au) + hc * (au * bv - av * bu)
+    permanent = (
+        ta * (abs(bu * cv) + abs(bv * cu)) + tb * (abs(cu * av) + abs(cv * au)) + tc * (abs(au * bv) + abs(av * bu))
+    )
+    return value, permanent
 
 
 @njit(cache=True)

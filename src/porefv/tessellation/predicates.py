@@ -127,7 +127,7 @@ def power_centre(cell, q, n, points, weights):
                 total[i] = numerator[i]
             count = add(total, count, product, np_, numerator)
         centre[axis] = 0.5 * estimate(numerator, count) / denominator
-    return centre
+    return centre[0], centre[1], centre[2]
 
 
 @njit(cache=True)

@@ -65,14 +65,16 @@ class RegularTriangulation:
                 "move the spheres to 0 or away from it"
             )
 
-        codes = morton_codes(points, n)
+        # Inside, spheres are numbered along a space-filling curve: near in space, near in memory.
+        curve = np.argsort(morton_codes(points, n), kind="stable")
+        points[:n] = points[curve]
+        weights[:n] = weights[curve]
         shuffled = np.random.default_rng(0).permutation(n)
-        order = np.concatenate([part[np.argsort(codes[part])] for part in (shuffled[r] for r in rounds(n))])
+        order = np.concatenate([np.sort(shuffled[part]) for part in rounds(n)])
         cells, neighbours, planes = _build(order, n, points, weights, box.size * scale)
-        rank = np.empty(n, np.int64)
-        rank[np.argsort(codes, kind="stable")] = np.arange(n)
+        names = np.concatenate([curve, np.arange(n, n + 6)]).astype(np.int32)
         self.cells, self.neighbours, self.local_vertices = _compact(
-            cells, neighbours, planes, rank, n, 0.5 / scale, weights, 1.0 / scale
+            cells, neighbours, planes, n, 0.5 / scale, weights, 1.0 / scale, names
         )
 
     @cached_property
@@ -140,8 +142,8 @@ def _build(order, n, points, weights, extent):
 
 
 @njit(cache=True)
-def _compact(cells, neighbours, planes, rank, n, half, weights, length):
-    """Drop free cells and number the rest along the curve of their first sphere, for locality."""
+def _compact(cells, neighbours, planes, n, half, weights, length, names):
+    """Drop free cells, number the rest along the curve of their first sphere, and give the spheres their own ids."""
     m = cells.shape[0]
     start = np.zeros(n + 1, np.int64)
     key = np.full(m, -1, np.int64)
@@ -151,7 +153,7 @@ def _compact(cells, neighbours, planes, rank, n, half, weights, length):
         least = n
         for i in range(4):
             if cells[t, i] < n:
-                least = min(least, rank[cells[t, i]])
+                least = min(least, cells[t, i])
         key[t] = least
         start[least + 1] += 1
     for k in range(n):
@@ -170,7 +172,7 @@ def _compact(cells, neighbours, planes, rank, n, half, weights, length):
             continue
         c = number[t]
         for i in range(4):
-            new_cells[c, i] = cells[t, i]
+            new_cells[c, i] = names[cells[t, i]]
             u = neighbours[t, i]
             new_neighbours[c, i] = number[u] if u >= 0 else -1
         for axis in range(3):
