@@ -9,6 +9,7 @@ from porefv.facets import (
     _cross,
     _dot,
     _height,
+    _overlaps,
     _plane_distance,
     _tangent,
     _towards,
@@ -79,10 +80,9 @@ def cell_solids(cells, n, points, sizes):
             for j in range(3):
                 m = cells[t, (i + 1 + j) % 4]
                 edge = u if j == 0 else (v if j == 1 else w)
-                d = _plane_distance(k, m, edge, n, points, sizes)
-                if d >= r:
+                if not _overlaps(k, m, edge, n, points, sizes):
                     continue
-                d = max(d, -r)
+                d = min(max(_plane_distance(k, m, edge, n, points, sizes), -r), r)
                 a = _cross(edge, v if j == 0 else (w if j == 1 else u))
                 b = _cross(edge, w if j == 0 else (u if j == 1 else v))
                 x = _cross(a, b)

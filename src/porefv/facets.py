@@ -61,6 +61,41 @@ def enumerate_facets(cells, neighbours, n):
 
 
 @njit(cache=True)
+def unite(facet_cells, facet_vertices, vertices, n, sizes, tolerance):
+    """Label of each cell, equal across facets whose Laguerre vertices are within `tolerance` of the smallest radius.
+
+    Labels follow the order of the cells.
+    """
+    parent = np.arange(vertices.shape[0], dtype=np.int32)
+    for f in range(facet_cells.shape[0]):
+        i = facet_cells[f, 0]
+        j = facet_cells[f, 1]
+        square = 0.0
+        for axis in range(3):
+            square += (vertices[i, axis] - vertices[j, axis]) ** 2
+        radius = np.inf
+        for v in range(3):
+            if facet_vertices[f, v] < n:
+                radius = min(radius, sizes[facet_vertices[f, v]])
+        if square <= (tolerance * radius) ** 2:
+            while parent[i] != i:
+                parent[i] = parent[parent[i]]
+                i = parent[i]
+            while parent[j] != j:
+                parent[j] = parent[parent[j]]
+                j = parent[j]
+            parent[max(i, j)] = min(i, j)
+    count = 0
+    for t in range(parent.shape[0]):  # a root comes before all that hang on it
+        if parent[t] == t:
+            parent[t] = count
+            count += 1
+        else:
+            parent[t] = parent[parent[t]]
+    return parent
+
+
+@njit(cache=True)
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
@@ -136,6 +171,7 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
             length += normals[f, axis] * (vertices[j, axis] - vertices[i, axis])
         areas[f] = area
         lengths[f] = length
+        rest = np.pi  # the angles at the spheres of a triangle or trapezoid add up to π
         for v in range(3):
             k = abc[v]
             sectors[f, v] = 0.0
@@ -145,11 +181,27 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
             c = abc[_LAST[v]]
             u = _towards(k, b, n, points)
             w = _towards(k, c, n, points)
-            x = _cross(u, w)
-            angle = np.arctan2(np.sqrt(_dot(x, x)), _dot(u, w))
+            if abc[1] >= n:
+                angle = 0.5 * np.pi
+            elif v == 2 or (v == 1 and abc[2] >= n):
+                angle = rest
+            else:
+                x = _cross(u, w)
+                angle = np.arctan2(np.sqrt(_dot(x, x)), _dot(u, w))
+                rest -= angle
             sectors[f, v] = 0.5 * angle * sizes[k] * sizes[k]
-            sectors[f, v] -= _half_segment(k, b, u, n, points, sizes)
-            sectors[f, v] -= _half_segment(k, c, w, n, points, sizes)
+            if _overlaps(k, b, u, n, points, sizes):
+                sectors[f, v] -= _half_segment(k, b, u, n, points, sizes)
+            if _overlaps(k, c, w, n, points, sizes):
+                sectors[f, v] -= _half_segment(k, c, w, n, points, sizes)
+
+
+@njit(cache=True)
+def _overlaps(k, m, u, n, points, sizes):
+    """Whether sphere k reaches beyond its Laguerre plane towards m."""
+    if m >= n:
+        return _height(k, m, points, sizes) < sizes[k]
+    return _dot(u, u) < (sizes[k] + sizes[m]) * (sizes[k] + sizes[m])
 
 
 @njit(cache=True)
@@ -163,12 +215,9 @@ def _plane_distance(k, m, u, n, points, sizes):
 
 @njit(cache=True)
 def _half_segment(k, m, u, n, points, sizes):
-    """Half the part of the disc of sphere k beyond the Laguerre plane towards m (0 without overlap)."""
+    """Half the part of the disc of sphere k beyond the Laguerre plane towards m, which it overlaps."""
     r = sizes[k]
-    d = _plane_distance(k, m, u, n, points, sizes)
-    if d >= r:
-        return 0.0
-    d = max(d, -r)
+    d = min(max(_plane_distance(k, m, u, n, points, sizes), -r), r)
     return 0.5 * (r * r * np.arccos(d / r) - d * np.sqrt((r - d) * (r + d)))
 
 
@@ -214,10 +263,9 @@ def facet_volumes(facet_cells, facet_vertices, vertices, n, points, sizes, volum
             for turn in range(2):
                 m = b if turn == 0 else c
                 edge = u if turn == 0 else w
-                d = _plane_distance(k, m, edge, n, points, sizes)
-                if d >= r:
+                if not _overlaps(k, m, edge, n, points, sizes):
                     continue
-                d = max(d, -r)
+                d = min(max(_plane_distance(k, m, edge, n, points, sizes), -r), r)
                 psi = _dihedral(edge, normal, qi, qj)
                 if turn == 1:  # the facet lies on the other side of this edge
                     psi = _dihedral((-edge[0], -edge[1], -edge[2]), normal, qi, qj)
@@ -246,15 +294,24 @@ def _tangent(u, v, w):
     """(numerator, denominator) of tan(Ω/2) for the triangle u, v, w (Van Oosterom and Strackee 1983)."""
     lu = np.sqrt(_dot(u, u))
     lv = np.sqrt(_dot(v, v))
-    lw = np.sqrt(_dot(w, w))
-    return _dot(_cross(u, v), w), lu * lv * lw + _dot(u, v) * lw + _dot(v, w) * lu + _dot(w, u) * lv
+    return _tangent_on(u, v, lu * lv + _dot(u, v), lu, lv, _cross(u, v), w)
+
+
+@njit(cache=True)
+def _tangent_on(u, v, base, lu, lv, normal, w):
+    """The same with what depends on the edge u, v alone worked out: base = |u||v| + u·v, normal = u x v."""
+    return _dot(normal, w), base * np.sqrt(_dot(w, w)) + _dot(v, w) * lu + _dot(w, u) * lv
 
 
 @njit(cache=True)
 def _solid_angle_between(u, v, qi, qj):
     """Signed solid angle of (u, v, qj) less that of (u, v, qi)."""
-    ni, di = _tangent(u, v, qi)
-    nj, dj = _tangent(u, v, qj)
+    lu = np.sqrt(_dot(u, u))
+    lv = np.sqrt(_dot(v, v))
+    base = lu * lv + _dot(u, v)
+    normal = _cross(u, v)
+    ni, di = _tangent_on(u, v, base, lu, lv, normal, qi)
+    nj, dj = _tangent_on(u, v, base, lu, lv, normal, qj)
     if di > 0.0 and dj > 0.0:  # both halves within ±90°: one arctangent gives the difference
         return 2.0 * np.arctan2(nj * di - ni * dj, di * dj + ni * nj)
     return 2.0 * (np.arctan2(nj, dj) - np.arctan2(ni, di))

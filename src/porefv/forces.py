@@ -99,17 +99,17 @@ def fluid_forces(
     on_spheres_p = np.zeros((n + 6, 3))
     on_spheres_v = np.zeros((n + 6, 3))
     weights = throats.facet_wetted_surfaces(slip)
-    drops = np.subtract(*pressure[mesh.cell_pore[mesh.facet_cells]].T)
-    fluid = (throats.facet_areas - throats.facet_sectors.sum(axis=1))[:, None] * throats.facet_normals
-    vectors = throats.total_vectors(fluid)
-    sums = throats.total_by_facet(np.maximum(weights, 0.0).sum(axis=1))
+    cell_pressure = pressure[mesh.cell_pore]
+    drops = cell_pressure[mesh.facet_cells[:, 0]] - cell_pressure[mesh.facet_cells[:, 1]]
+    vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
+    sums = throats.total_by_facet(_positive_sum(weights))
     _scatter(
         mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, weights, sums, drops, n,
         on_spheres_p, on_spheres_v,
     )  # fmt: skip
 
     faces = mesh.wall_faces
-    face_pressure = pressure[mesh.cell_pore[faces.cells]]
+    face_pressure = cell_pressure[faces.cells]
     push = np.zeros((6, 3))
     thrust = np.zeros(3)
     for wall in range(6):
@@ -136,6 +136,16 @@ def fluid_forces(
         thrust=thrust,
         scale=max(spread, abs(reference)) * float(sections.max()),
     )
+
+
+@njit(cache=True)
+def _positive_sum(weights):
+    """(f,): sum of the positive weights of each facet."""
+    sums = np.zeros(weights.shape[0])
+    for f in range(weights.shape[0]):
+        for v in range(3):
+            sums[f] += max(weights[f, v], 0.0)
+    return sums
 
 
 @njit(cache=True)

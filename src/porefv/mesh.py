@@ -10,7 +10,7 @@ import numpy as np
 
 from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes
 from porefv.errors import InputError
-from porefv.facets import enumerate_facets
+from porefv.facets import enumerate_facets, unite
 from porefv.packing import Box, Packing
 from porefv.tessellation import RegularTriangulation
 from porefv.tessellation.triangulation import wall_normals
@@ -127,24 +127,10 @@ class PoreMesh:
 
     @cached_property
     def _united(self) -> tuple[np.ndarray, np.ndarray]:
-        first, second = self.facet_cells.T
-        gap = np.linalg.norm(self.local_vertices[first] - self.local_vertices[second], axis=1)
-        radii = np.concatenate([self.packing.radii, np.full(6, np.inf)])
-        gap /= radii[self.facet_vertices].min(axis=1)
-        node = self._labels(gap <= TIE_TOLERANCE)
-        pore = self._labels(gap <= self.unite_tolerance) if self.unite_tolerance > TIE_TOLERANCE else node
-        return node, pore
-
-    def _labels(self, join: np.ndarray) -> np.ndarray:
-        """Label of each cell after joining across the facets marked; labels follow the order of the cells."""
-        if not join.any():
-            return np.arange(self.n_cells, dtype=np.int32)
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        pairs = self.facet_cells[join]
-        graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(self.n_cells, self.n_cells))
-        return connected_components(graph, directed=False)[1]
+        return tuple(
+            unite(self.facet_cells, self.facet_vertices, self.local_vertices, self.n_spheres, self.sizes, tolerance)
+            for tolerance in (TIE_TOLERANCE, max(self.unite_tolerance, TIE_TOLERANCE))
+        )
 
     @property
     def cell_node(self) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sparse
+from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from porefv.errors import ComputationError
@@ -100,19 +101,32 @@ def _isolated(pairs, conductances, free):
 
 def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
     """Pressures with those of the free pores solved for, all others held."""
-    count = int(np.count_nonzero(free))
-    number = np.full(len(free), -1, np.int32)
-    number[free] = np.arange(count, dtype=np.int32)
-    leaks = np.zeros(count)
-    rhs = sources[free].astype(float)
-    for i, j in (pairs.T, pairs.T[::-1]):
-        across = free[i] & ~free[j]
-        nodes = number[i[across]]
-        leaks += np.bincount(nodes, conductances[across], count)
-        rhs += np.bincount(nodes, conductances[across] * pressure[j[across]], count)
-    inside = free[pairs].all(axis=1)
+    number = np.where(free, np.cumsum(free) - 1, -1).astype(np.int32)
+    rhs = sources[free]
+    leaks = np.zeros(len(rhs))
+    inside = _leak(pairs, conductances, pressure, number, leaks, rhs)
     network = Network.from_links(number[pairs[inside]], conductances[inside], leaks)
     x, report = solve(network, rhs, solver, tolerance)
     solved = pressure.copy()
     solved[free] = x
     return solved, report
+
+
+@njit(cache=True)
+def _leak(pairs, conductances, pressure, number, leaks, rhs):
+    """Add links to held pores to `leaks` and `rhs`; returns which links lie between free pores, (t,) bool."""
+    inside = np.zeros(pairs.shape[0], np.bool_)
+    for t in range(pairs.shape[0]):
+        i = pairs[t, 0]
+        j = pairs[t, 1]
+        a = number[i]
+        b = number[j]
+        if a >= 0 and b >= 0:
+            inside[t] = conductances[t] > 0.0
+        elif a >= 0:
+            leaks[a] += conductances[t]
+            rhs[a] += conductances[t] * pressure[j]
+        elif b >= 0:
+            leaks[b] += conductances[t]
+            rhs[b] += conductances[t] * pressure[i]
+    return inside

@@ -76,6 +76,12 @@ class Throats:
         """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
         return self._sections[3]
 
+    @cached_property
+    def facet_fluid_areas(self) -> np.ndarray:
+        """(f,): A^f = A - Σ A^k of each facet [m²]."""
+        a, b, c = self.facet_sectors.T
+        return self.facet_areas - (a + b + c)
+
     @property
     def facet_volumes(self) -> np.ndarray:
         """(f,): void volume φ of each facet's pair of pyramids Ω_ij [m³]."""
@@ -91,9 +97,10 @@ class Throats:
     @cached_property
     def first_facets(self) -> np.ndarray:
         """(t,): a facet of each throat; the throat takes its sense."""
-        first = np.not_equal(*self.mesh.cell_pore[self.mesh.facet_cells].T)
-        first[self._further[0]] = False
-        return np.flatnonzero(first)
+        first, second = self.mesh.facet_cells.T
+        passes = self.mesh.cell_pore[first] != self.mesh.cell_pore[second]
+        passes[self._further[0]] = False
+        return np.flatnonzero(passes)
 
     @cached_property
     def _further(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -172,7 +179,7 @@ class Throats:
     @cached_property
     def fluid_areas(self) -> np.ndarray:
         """(t,): fluid cross-section A^f of each throat [m²]."""
-        return self._total(self.facet_areas - self.facet_sectors.sum(axis=1))
+        return self._total(self.facet_fluid_areas)
 
     @cached_property
     def volumes(self) -> np.ndarray:
@@ -188,7 +195,8 @@ class Throats:
 
     def wetted_surfaces(self, slip: np.ndarray) -> np.ndarray:
         """(t,): Σγ^k of each throat over its spheres and no-slip walls [m²]."""
-        return self._total(self.facet_wetted_surfaces(slip).sum(axis=1))
+        a, b, c = self.facet_wetted_surfaces(slip).T
+        return self._total(a + b + c)
 
     def inscribed_radii(self, slip: np.ndarray) -> np.ndarray:
         """(t,): radius of the circle in the throat's plane tangent to its spheres and no-slip walls [m].
