@@ -9,8 +9,8 @@ from numba import njit
 
 from porefv.errors import ComputationError
 from porefv.packing import Box
-from porefv.tessellation import insertion
-from porefv.tessellation.ordering import morton_codes, rounds
+from porefv.tessellation.blocks import triangulate
+from porefv.tessellation.ordering import morton_codes
 
 
 class RegularTriangulation:
@@ -69,13 +69,9 @@ class RegularTriangulation:
         curve = np.argsort(morton_codes(points, n), kind="stable")
         points[:n] = points[curve]
         weights[:n] = weights[curve]
-        shuffled = np.random.default_rng(0).permutation(n)
-        order = np.concatenate([np.sort(shuffled[part]) for part in rounds(n)])
-        cells, neighbours, planes = _build(order, n, points, weights, box.size * scale)
-        names = np.concatenate([curve, np.arange(n, n + 6)]).astype(np.int32)
-        self.cells, self.neighbours, self.local_vertices = _compact(
-            cells, neighbours, planes, n, 0.5 / scale, weights, 1.0 / scale, names
-        )
+        cells, self.neighbours, planes = triangulate(points, weights, n, box.size * scale)
+        self.local_vertices = _vertices(cells, planes, n, weights, 1.0 / scale)
+        self.cells = np.concatenate([curve, np.arange(n, n + 6)]).astype(np.int32)[cells]
 
     @cached_property
     def vertices(self) -> np.ndarray:
@@ -113,74 +109,16 @@ def exact_origin(box: Box) -> np.ndarray:
     return np.where(box.upper < 0.0, np.ceil(box.upper / grid), origin) * grid
 
 
-def _build(order, n, points, weights, extent):
-    capacity = 8 * n + 64
-    cells = np.empty((capacity, 4), np.int32)
-    neighbours = np.empty((capacity, 4), np.int32)
-    planes = np.empty((capacity, 4))
-    bounds = np.empty(capacity)
-    marks = np.zeros(capacity, np.int32)
-    ends = np.empty((capacity, 4), np.int32)
-    free = np.empty(capacity, np.int32)
-    state = np.zeros(4, np.int64)
-    magnitude = float(np.sum(np.abs(points[:n]).max(axis=0) ** 2) + weights[:n].max() ** 2)
-    magnitude += float(np.abs(weights[n:]).max()) ** 2
-    insertion.start(order[0], n, points, weights, cells, neighbours, planes, bounds, free, state, extent, magnitude)
-    done = 1
-    while True:
-        done = insertion.insert(
-            order, done, n, points, weights, cells, neighbours, planes, bounds, marks, ends, free, state,
-            extent, magnitude,
-        )  # fmt: skip
-        if done == n:
-            break
-        cells, neighbours, planes, bounds, marks, ends, free = (
-            np.concatenate([a, np.zeros_like(a)]) for a in (cells, neighbours, planes, bounds, marks, ends, free)
-        )
-    used = state[1]
-    return cells[:used], neighbours[:used], planes[:used]
-
-
 @njit(cache=True)
-def _compact(cells, neighbours, planes, n, half, weights, length, names):
-    """Drop free cells, number the rest along the curve of their first sphere, and give the spheres their own ids."""
-    m = cells.shape[0]
-    start = np.zeros(n + 1, np.int64)
-    key = np.full(m, -1, np.int64)
-    for t in range(m):
-        if cells[t, 0] < 0:
-            continue
-        least = n
-        for i in range(4):
-            if cells[t, i] < n:
-                least = min(least, cells[t, i])
-        key[t] = least
-        start[least + 1] += 1
-    for k in range(n):
-        start[k + 1] += start[k]
-    count = start[n]
-    number = np.full(m, -1, np.int32)
-    for t in range(m):
-        if key[t] >= 0:
-            number[t] = start[key[t]]
-            start[key[t]] += 1
-    new_cells = np.empty((count, 4), np.int32)
-    new_neighbours = np.empty((count, 4), np.int32)
-    vertices = np.empty((count, 3))
-    for t in range(m):
-        if key[t] < 0:
-            continue
-        c = number[t]
-        for i in range(4):
-            new_cells[c, i] = names[cells[t, i]]
-            u = neighbours[t, i]
-            new_neighbours[c, i] = number[u] if u >= 0 else -1
+def _vertices(cells, planes, n, weights, length):
+    """(m, 3): power centre of each cell; those of cells with walls lie on them exactly."""
+    vertices = np.empty((cells.shape[0], 3))
+    for t in range(cells.shape[0]):
         for axis in range(3):
-            vertices[c, axis] = planes[t, axis] * half
+            vertices[t, axis] = 0.5 * planes[t, axis] * length
         for i in range(4):
             wall = cells[t, i] - n
-            if wall >= 0:  # the Laguerre vertex lies on the wall exactly
-                axis = wall // 2
+            if wall >= 0:
                 offset = weights[n + wall] * length
-                vertices[c, axis] = offset if wall % 2 else -offset
-    return new_cells, new_neighbours, vertices
+                vertices[t, wall // 2] = offset if wall % 2 else -offset
+    return vertices
