@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv import memory
 from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes
 from porefv.errors import InputError
 from porefv.facets import enumerate_facets, unite
@@ -91,6 +92,7 @@ class PoreMesh:
     @cached_property
     def triangulation(self) -> RegularTriangulation:
         """The regular triangulation the mesh is made of."""
+        memory.ensure(self.n_spheres)
         return RegularTriangulation(self.packing.centres, self.packing.radii, self.box)
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from porefv import memory
 from porefv.packing import WALLS
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ def scene_text(scene: Scene, packing: Packing) -> str:
             f"{asked}{'; VTK files' if output.vtk else ''}, in {_path(directory)}{exists}",
         ),
     ]
+    free = memory.available()
+    needed = f"about {memory.required(len(packing)) / 2**30:.1f} GiB at the most"
+    rows.append(("memory", needed if free is None else f"{needed}, {free / 2**30:.1f} GiB free"))
     return "\n".join([f"{_path(scene.path or 'scene')} is sound", *_rows(rows)])
 
 
