@@ -104,11 +104,11 @@ class ApproximateCholesky:
         )
         return nodes[order], starts, nodes[rows], factors, pivots
 
-    def apply(self, r: np.ndarray) -> np.ndarray:
-        """(n,): (L D Lᵀ)⁻¹ r."""
+    def apply(self, r: np.ndarray) -> tuple[np.ndarray, float]:
+        """z = (L D Lᵀ)⁻¹ r, (n,), and the product r·z."""
         z = np.empty_like(r)
-        substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z)
-        return z
+        product = substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z)
+        return z, product
 
 
 @njit(cache=True)
@@ -356,12 +356,13 @@ def eliminate(starts, columns, links, leaks, n):
 
 @njit(cache=True, parallel=True)
 def substitute(order, parts, starts, rows, factors, pivots, r, z):
-    """z = (L D Lᵀ)⁻¹ r."""
+    """z = (L D Lᵀ)⁻¹ r; returns r·z."""
     n = order.shape[0]
     n_parts = parts.shape[0] - 1
     n_inner = parts[n_parts]
     y = np.empty(n)
     shares = np.zeros((n_parts, n - n_inner))
+    products = np.zeros(n_parts + 1)
     for part in prange(n_parts):
         first = parts[part]
         last = parts[part + 1]
@@ -388,6 +389,7 @@ def substitute(order, parts, starts, rows, factors, pivots, r, z):
             s += factors[e] * y[rows[e]]
         y[k] = s
         z[order[k]] = s
+        products[n_parts] += s * r[order[k]]
     for part in prange(n_parts):
         for k in range(parts[part + 1] - 1, parts[part] - 1, -1):
             s = y[k] / pivots[k]
@@ -395,6 +397,8 @@ def substitute(order, parts, starts, rows, factors, pivots, r, z):
                 s += factors[e] * y[rows[e]]
             y[k] = s
             z[order[k]] = s
+            products[part] += s * r[order[k]]
+    return products.sum()
 
 
 @njit(cache=True)

@@ -20,9 +20,9 @@ def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, 
 
     The flow is half of all that enters or leaves; Σ ε d|x| is what rounding x to double precision alone may lose.
     """
-    lost = network.residual(rhs, x)
-    flow, size = _scales(network.leaks, network.diagonal, rhs, x)
-    return float(np.abs(lost).sum()), 0.5 * flow, np.finfo(float).eps * size
+    lost = float(np.abs(network.residual(rhs, x)).sum())
+    flow = 0.5 * float(np.abs(network.leaks * x - rhs).sum())
+    return lost, flow, np.finfo(float).eps * float((network.diagonal * np.abs(x)).sum())
 
 
 def conjugate_gradients(
@@ -46,21 +46,20 @@ def conjugate_gradients(
             return x, iterations
         before = lost
         r = a.residual(rhs, x)
-        z = preconditioner.apply(r)
+        z, rz = preconditioner.apply(r)
         p = z.copy()
         ap = np.empty(len(a))
-        rz = _dot(r, z)
         while iterations < _MAX_ITERATIONS:
             iterations += 1
             alpha = rz / _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
             lost, flow, size = _advance(x, r, p, ap, alpha, a.leaks, a.diagonal, rhs)
             if lost <= 0.5 * max(tolerance * 0.5 * flow, np.finfo(float).eps * size):
                 break
-            z = preconditioner.apply(r)
-            new = _dot(r, z)
+            z, new = preconditioner.apply(r)
             if not new > 0.0:
                 break
-            _turn(p, z, new / rz)
+            p *= new / rz
+            p += z
             rz = new
 
 
@@ -85,50 +84,15 @@ def _multiply(starts, columns, links, leaks, p, ap):
 def _advance(x, r, p, ap, alpha, leaks, diagonal, rhs):
     """x += α p, r -= α ap; returns Σ|r|, Σ|e x - b| and Σ d|x|."""
     n = p.shape[0]
-    parts = np.zeros(((n + _BLOCK - 1) // _BLOCK, 3))
-    for block in prange(parts.shape[0]):
-        lost = flow = size = 0.0
+    n_blocks = (n + _BLOCK - 1) // _BLOCK
+    lost = np.zeros(n_blocks)
+    flow = np.zeros(n_blocks)
+    size = np.zeros(n_blocks)
+    for block in prange(n_blocks):
         for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
             x[i] += alpha * p[i]
             r[i] -= alpha * ap[i]
-            lost += abs(r[i])
-            flow += abs(leaks[i] * x[i] - rhs[i])
-            size += diagonal[i] * abs(x[i])
-        parts[block, 0] = lost
-        parts[block, 1] = flow
-        parts[block, 2] = size
-    return parts[:, 0].sum(), parts[:, 1].sum(), parts[:, 2].sum()
-
-
-@njit(cache=True, parallel=True)
-def _scales(leaks, diagonal, rhs, x):
-    """Σ|e x - b| and Σ d|x|."""
-    n = x.shape[0]
-    parts = np.zeros(((n + _BLOCK - 1) // _BLOCK, 2))
-    for block in prange(parts.shape[0]):
-        flow = size = 0.0
-        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
-            flow += abs(leaks[i] * x[i] - rhs[i])
-            size += diagonal[i] * abs(x[i])
-        parts[block, 0] = flow
-        parts[block, 1] = size
-    return parts[:, 0].sum(), parts[:, 1].sum()
-
-
-@njit(cache=True, parallel=True)
-def _dot(r, z):
-    n = r.shape[0]
-    parts = np.zeros((n + _BLOCK - 1) // _BLOCK)
-    for block in prange(parts.shape[0]):
-        total = 0.0
-        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
-            total += r[i] * z[i]
-        parts[block] = total
-    return parts.sum()
-
-
-@njit(cache=True, parallel=True)
-def _turn(p, z, beta):
-    """p = z + β p."""
-    for i in prange(p.shape[0]):
-        p[i] = z[i] + beta * p[i]
+            lost[block] += abs(r[i])
+            flow[block] += abs(leaks[i] * x[i] - rhs[i])
+            size[block] += diagonal[i] * abs(x[i])
+    return lost.sum(), flow.sum(), size.sum()

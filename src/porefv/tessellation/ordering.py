@@ -13,17 +13,17 @@ from numba import njit
 _BITS = 20
 
 
+def morton_codes(points: np.ndarray) -> np.ndarray:
+    """(n,) int64: Morton code of each point, its coordinates on a 2^20 grid with their bits interleaved."""
+    lower = points.min(axis=0)
+    size = float((points.max(axis=0) - lower).max())
+    return _interleave(points, lower, ((1 << _BITS) - 1) / size if size > 0.0 else 0.0)
+
+
 @njit(cache=True)
-def morton_codes(points, n):
-    """Morton code of the first n points: their coordinates on a 2^20 grid, bits interleaved."""
-    codes = np.empty(n, np.int64)
-    lower = np.empty(3)
-    size = 0.0
-    for axis in range(3):
-        lower[axis] = points[:n, axis].min()
-        size = max(size, points[:n, axis].max() - lower[axis])
-    inverse = ((1 << _BITS) - 1) / size if size > 0.0 else 0.0
-    for k in range(n):
+def _interleave(points, lower, inverse):
+    codes = np.empty(points.shape[0], np.int64)
+    for k in range(points.shape[0]):
         code = np.int64(0)
         for axis in range(3):
             code |= _spread(np.int64((points[k, axis] - lower[axis]) * inverse)) << axis

@@ -66,7 +66,7 @@ class RegularTriangulation:
             )
 
         # Inside, spheres are numbered along a space-filling curve: near in space, near in memory.
-        curve = np.argsort(morton_codes(points, n), kind="stable")
+        curve = np.argsort(morton_codes(points[:n]), kind="stable")
         points[:n] = points[curve]
         weights[:n] = weights[curve]
         cells, self.neighbours, planes = triangulate(points, weights, n, box.size * scale)
