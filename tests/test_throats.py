@@ -38,7 +38,7 @@ def facet_throat(mesh, *vertices):
     return mesh.throats.facet_throat[facet[0]]
 
 
-# ---- sums ------------------------------------------------------------------------------------------------
+# ---- sums ----------
 
 packings = st.tuples(
     st.integers(1, 60), st.sampled_from([0.02, 0.2, 0.5, 1.0]), st.integers(0, 10**6), st.floats(0.001, 0.25)
@@ -103,7 +103,7 @@ def test_surfaces_of_reference_packings_are_those_outside_their_neighbours(mesh_
     assert_allclose(walls, 1.0 - np.bincount(found.wall_ids, covered, 6), rtol=1e-12)
 
 
-# ---- the overlap rule --------------------------------------------------------------------------------------
+# ---- the overlap rule ----------
 
 
 @settings(max_examples=50)
@@ -188,7 +188,7 @@ def test_deep_overlaps_of_many_spheres_still_give_finite_throats(unit_flow):
     assert flow.forces.conservation_residual < 1e-12
 
 
-# ---- single throats ----------------------------------------------------------------------------------------
+# ---- single throats ----------
 
 
 def test_throat_of_one_sphere_and_two_walls():
@@ -248,7 +248,7 @@ def test_solid_angles_wait_until_they_are_needed(reference, unit_flow):
     assert "_volumes" in vars(mesh.throats)
 
 
-# ---- inscribed circles -------------------------------------------------------------------------------------
+# ---- inscribed circles ----------
 
 
 @pytest.mark.parametrize("radii", [(0.1, 0.1, 0.1), (0.1, 0.12, 0.07), (0.05, 0.15, 0.1)])

@@ -22,7 +22,7 @@ def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, 
     """
     lost = float(np.abs(network.residual(rhs, x)).sum())
     flow = 0.5 * float(np.abs(network.leaks * x - rhs).sum())
-    return lost, flow, np.finfo(float).eps * float((network.diagonal * np.abs(x)).sum())
+    return lost, flow, float(np.finfo(float).eps * (network.diagonal * np.abs(x)).sum())
 
 
 def conjugate_gradients(

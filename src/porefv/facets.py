@@ -157,8 +157,11 @@ def centroid(a, b, c, n, points, sizes):
 
 
 @njit(cache=True, parallel=True)
-def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, areas, sectors):
-    """Unit normal, L = (P_j - P_i)·n, area A and sector areas A^k of each facet."""
+def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, areas, sectors, covered):
+    """Unit normal, L = (P_j - P_i)·n, area A, sector areas A^k of each facet, and whether its spheres cover it.
+
+    They do where its radical centre, the point of equal power in its plane, lies inside of them.
+    """
     for f in prange(facet_cells.shape[0]):
         abc = (facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2])
         s = area_vector(abc[0], abc[1], abc[2], n, points, sizes)
@@ -171,6 +174,14 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
             length += normals[f, axis] * (vertices[j, axis] - vertices[i, axis])
         areas[f] = area
         lengths[f] = length
+        k = abc[0]
+        power = -sizes[k] * sizes[k]
+        above = 0.0
+        for axis in range(3):
+            gap = points[k, axis] - vertices[facet_cells[f, 0], axis]
+            power += gap * gap
+            above += gap * normals[f, axis]
+        covered[f] = power <= above * above
         rest = np.pi  # the angles at the spheres of a triangle or trapezoid add up to π
         for v in range(3):
             k = abc[v]
@@ -218,7 +229,8 @@ def _half_segment(k, m, u, n, points, sizes):
     """Half the part of the disc of sphere k beyond the Laguerre plane towards m, which it overlaps."""
     r = sizes[k]
     d = min(max(_plane_distance(k, m, u, n, points, sizes), -r), r)
-    return 0.5 * (r * r * np.arccos(d / r) - d * np.sqrt((r - d) * (r + d)))
+    chord = np.sqrt((r - d) * (r + d))
+    return 0.5 * (r * r * np.arctan2(chord, d) - d * chord)
 
 
 @njit(cache=True, parallel=True)

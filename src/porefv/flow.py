@@ -231,7 +231,7 @@ class PoreFlow:
         drop = pressures[2 * axis] - pressures[2 * axis + 1]
         flux = math.copysign(0.5 * (self.inflow + self.outflow), drop)
         box = self.mesh.box
-        return self.fluid.viscosity * flux * float(box.size[axis]) / (drop * box.section(axis))
+        return float(self.fluid.viscosity * flux * box.size[axis] / (drop * box.section(axis)))
 
     @property
     def hydraulic_conductivity(self) -> float:

@@ -36,10 +36,10 @@ class Throats:
     # ---- facets: geometry as computed ---------------------------------------------------------------------------
 
     @cached_property
-    def _sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         mesh = self.mesh
         f = len(mesh.facet_cells)
-        arrays = np.empty((f, 3)), np.empty(f), np.empty(f), np.empty((f, 3))
+        arrays = np.empty((f, 3)), np.empty(f), np.empty(f), np.empty((f, 3)), np.empty(f, bool)
         facet_sections(
             mesh.facet_cells, mesh.facet_vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points,
             mesh.sizes, *arrays,
@@ -75,6 +75,11 @@ class Throats:
     def facet_sectors(self) -> np.ndarray:
         """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
         return self._sections[3]
+
+    @property
+    def facet_covered(self) -> np.ndarray:
+        """(f,) bool: facets covered by their spheres, all of which hold the facet's radical centre."""
+        return self._sections[4]
 
     @cached_property
     def facet_fluid_areas(self) -> np.ndarray:
@@ -217,8 +222,8 @@ class Throats:
 
     @cached_property
     def closed(self) -> np.ndarray:
-        """(t,) bool: throats without a fluid cross-section, A^f <= 0: nothing flows through them."""
-        return self.fluid_areas <= 0.0
+        """(t,) bool: throats without a fluid cross-section: A^f <= 0, or covered by their spheres. Nothing flows."""
+        return (self.fluid_areas <= 0.0) | self.facet_covered[self.first_facets]
 
     def __repr__(self) -> str:
         return f"Throats({len(self)} throats between {self.mesh.n_pores} pores)"

@@ -18,7 +18,7 @@ from porefv.tessellation.triangulation import exact_origin
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 
-# ---- the definition, in rational numbers -------------------------------------------------------------------
+# ---- the definition, in rational numbers ----------
 
 
 def fractions(values):
@@ -122,7 +122,7 @@ def cell_set(tri, names=None):
     return {tuple(cell) for cell in np.sort(names[tri.cells], axis=1).tolist()}
 
 
-# ---- small cases -------------------------------------------------------------------------------------------
+# ---- small cases ----------
 
 grid = st.integers(1, 7).map(lambda k: k / 8)
 free = st.floats(1e-3, 1.0 - 1e-3)
@@ -189,7 +189,7 @@ def test_coordinates_from_the_local_origin_are_exact(lower, size, where):
         assert fractions(local) == less(fractions(point), fractions(origin))
 
 
-# ---- known cases -------------------------------------------------------------------------------------------
+# ---- known cases ----------
 
 
 def test_one_sphere_has_eight_cells_of_three_walls():
@@ -292,7 +292,7 @@ def test_coordinates_too_small_for_exact_products_are_refused():
         RegularTriangulation(np.array([[1e-50, 0.5, 0.5]]), np.array([0.1]), Box([-1, 0, 0], [1, 1, 1]))
 
 
-# ---- others' triangulations --------------------------------------------------------------------------------
+# ---- others' triangulations ----------
 
 
 def local(packing):
@@ -371,7 +371,7 @@ def test_random_points_of_random_weights_have_the_cells_of_qhull():
     assert cell_set_of_spheres(tri) == within_the_box(Points, hull_tetrahedra(Points))
 
 
-# ---- lattices ----------------------------------------------------------------------------------------------
+# ---- lattices ----------
 
 
 @pytest.mark.parametrize("kind, m", [("sc", 10), ("bcc", 8), ("fcc", 7), ("hcp", 13)])
