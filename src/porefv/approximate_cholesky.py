@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import get_num_threads, njit, prange
 
+from porefv.errors import ComputationError
 from porefv.network import Network
 
 _GROUND = -1
@@ -75,6 +76,10 @@ class ApproximateCholesky:
             pieces = list(pool.map(factor, range(n_parts)))
         pieces.append(cls._separator_piece(network, separator, pieces))
 
+        pivots = np.concatenate([piece[4] for piece in pieces])
+        if not (pivots > 0.0).all():
+            raise ComputationError("the network is singular: a part of it is not joined to any imposed pressure")
+
         order = np.concatenate([piece[0] for piece in pieces])
         position = np.empty(n, np.int32)
         position[order] = np.arange(n, dtype=np.int32)
@@ -85,7 +90,7 @@ class ApproximateCholesky:
             np.concatenate([piece[1][:-1] + fill for piece, fill in zip(pieces, fills, strict=False)] + [fills[-1:]]),
             np.concatenate([position[piece[2]] for piece in pieces]),
             np.concatenate([piece[3] for piece in pieces]),
-            np.concatenate([piece[4] for piece in pieces]),
+            pivots,
         )
 
     @staticmethod
@@ -346,8 +351,8 @@ def eliminate(starts, columns, links, leaks, n):
                         other[link] = b if end == 0 else a
                         weight[link] = strength
                         degree[x] += 1
-        if eliminated - before < 0.05 * (n - before):
-            limit = max(limit + 1, limit * 5 // 4)
+        if eliminated - before < 0.3 * (n - before):
+            limit += max(1, limit // 2)
     return (
         order, factor_starts, rows[:filled].copy(), factors[:filled].copy(), pivots,
         kept[:n_kept].copy(), strengths[:n_kept].copy(), ground[n:].copy(),

@@ -115,12 +115,14 @@ def fluid_forces(
     for wall in range(6):
         on_wall = faces.walls == wall
         axis, sense = wall // 2, (1.0 if wall % 2 else -1.0)
-        section = mesh.box.section(axis)
-        force = sense * (np.dot(face_pressure[on_wall], faces.areas[on_wall]) + reference * section)
+        force = sense * np.dot(face_pressure[on_wall], faces.areas[on_wall])
         if pressure_walls[wall]:
             thrust[axis] -= force
         else:
-            push[wall, axis] = force
+            push[wall, axis] = force + sense * reference * mesh.box.section(axis)
+    for axis in range(3):  # on two open ends the reference cancels, without rounding
+        ends = int(pressure_walls[2 * axis]) - int(pressure_walls[2 * axis + 1])
+        thrust[axis] += ends * reference * mesh.box.section(axis)
 
     volumes = 4.0 / 3.0 * np.pi * mesh.packing.radii**3
     weight = np.zeros(3) if weight is None else np.asarray(weight, float)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sparse
 from numba import njit, prange
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,8 @@ class Network:
 
     def to_matrix(self) -> sparse.csr_array:
         """A as a scipy matrix."""
+        from scipy import sparse
+
         n = len(self)
         off = sparse.csr_array((-self.links, self.columns.copy(), self.starts.copy()), shape=(n, n))
         off.sum_duplicates()

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sparse
 from numba import njit
-from scipy.sparse.csgraph import connected_components
 
 from porefv.errors import ComputationError
 from porefv.network import Network
@@ -71,7 +69,7 @@ def solve_network(
     if free.all():
         raise ComputationError("no pore has an imposed pressure: pressures are defined only up to a constant")
     sources = np.zeros(n) if sources is None else sources
-    isolated = _isolated(pairs, conductances, free)
+    isolated = ~_reached(pairs, conductances, ~free)
     if np.any(sources[isolated] != 0.0):
         pore = int(np.flatnonzero(isolated & (sources != 0.0))[0])
         raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
@@ -79,6 +77,12 @@ def solve_network(
     pressure = np.where(free, 0.0, fixed)
     pressure, report = _solve_free(pairs, conductances, pressure, free & ~isolated, sources, solver, tolerance)
     if isolated.any():
+        cut_off = ~_reached(pairs, np.ones(len(pairs)), ~free)
+        if cut_off.any():
+            raise ComputationError(
+                f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
+                "that lead to an imposed pressure: their pressure is not defined"
+            )
         links = np.ones(len(pairs)) if links is None else links
         touching = isolated[pairs].any(axis=1)
         pressure, _ = _solve_free(
@@ -87,16 +91,30 @@ def solve_network(
     return PressureSolution(pressure, isolated, report)
 
 
-def _isolated(pairs, conductances, free):
-    n = len(free)
-    if np.all(conductances > 0.0):
-        return np.zeros(n, bool)  # the facets of the triangulation join all its cells
-    open_pairs = pairs[conductances > 0.0]
-    graph = sparse.coo_array((np.ones(len(open_pairs), np.int8), open_pairs.T), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
-    supplied = np.zeros(count, bool)
-    supplied[label[~free]] = True
-    return ~supplied[label]
+@njit(cache=True)
+def _reached(pairs, weights, sources):
+    """(n,) bool: nodes that links of positive weight join to a source."""
+    n = sources.shape[0]
+    parent = np.arange(n)
+    for t in range(pairs.shape[0]):
+        if weights[t] > 0.0:
+            i = pairs[t, 0]
+            j = pairs[t, 1]
+            while parent[i] != i:
+                parent[i] = parent[parent[i]]
+                i = parent[i]
+            while parent[j] != j:
+                parent[j] = parent[parent[j]]
+                j = parent[j]
+            parent[max(i, j)] = min(i, j)
+    reached = np.zeros(n, np.bool_)
+    for i in range(n):  # a root comes before all that hang on it
+        parent[i] = parent[parent[i]]
+        if sources[i]:
+            reached[parent[i]] = True
+    for i in range(n):
+        reached[i] = reached[parent[i]]
+    return reached
 
 
 def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):

@@ -84,9 +84,15 @@ def solve(
     else:
         x, iterations = conjugate_gradients(network, rhs, ApproximateCholesky.of(network), tolerance)
     lost, flow, floor = imbalance(network, rhs, x)
-    flowing = flow > floor
-    reached = lost / flow if flowing else 0.0
-    floor = floor / flow if flowing else 0.0
+    if floor > flow:
+        if _driven(network, rhs):
+            raise ComputationError(
+                "conductances differ by too many decades for double precision: rounding alone would lose as much as "
+                "flows; leave out spheres that are much smaller than the rest"
+            )
+        flow, lost, floor = 1.0, 0.0, 0.0  # equal pressures: nothing flows but what rounding makes
+    reached = lost / flow
+    floor = floor / flow
     report = SolverReport(solver, n, iterations, tolerance, reached, floor, time.perf_counter() - begin)
     if not reached <= max(tolerance, floor):
         raise ComputationError(
@@ -96,6 +102,19 @@ def solve(
     return x, report
 
 
+def _driven(network: Network, rhs: np.ndarray) -> bool:
+    """Whether some part of the network is held at different pressures."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, part = connected_components(network.to_matrix(), directed=False)
+    held = np.flatnonzero(network.leaks > 0.0)
+    values = rhs[held] / network.leaks[held]
+    lowest, highest = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(lowest, part[held], values)
+    np.maximum.at(highest, part[held], values)
+    return bool(np.any(highest - lowest > 1e-9 * np.abs(values).max()) or np.any(rhs[network.leaks == 0.0] != 0.0))
+
+
 def _direct(network: Network, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
     import scipy.sparse as sparse
     from scipy.sparse.linalg import splu
@@ -103,7 +122,10 @@ def _direct(network: Network, rhs: np.ndarray, tolerance: float) -> tuple[np.nda
     # Scaled to a unit diagonal: units and contrast then do not meet the factorisation's thresholds.
     scale = sparse.diags_array(1.0 / np.sqrt(network.diagonal))
     matrix = (scale @ network.to_matrix() @ scale).tocsc()
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    try:
+        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:
+        raise ComputationError("the network is singular: a part of it is not joined to any imposed pressure") from None
     x = scale @ factor.solve(scale @ rhs)
     refinements = 0
     while refinements < 3:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,7 +140,7 @@ class Throats:
         return self.total_by_facet(values)[self.first_facets]
 
     def total_by_facet(self, values: np.ndarray) -> np.ndarray:
-        """(f,): sum of facet values over each facet's throat."""
+        """(f, ...): sum of facet values over each facet's throat."""
         further, first, _ = self._further
         if len(further) == 0:
             return values
@@ -206,19 +207,48 @@ class Throats:
     def inscribed_radii(self, slip: np.ndarray) -> np.ndarray:
         """(t,): radius of the circle in the throat's plane tangent to its spheres and no-slip walls [m].
 
-        On walls with slip, (6,) bool, the circle is centred. Zero where there is no such circle; of a throat of
-        several facets, the least.
+        On walls with slip, (6,) bool, the circle is centred. Zero where there is no such circle. A throat with more
+        than three vertices has the least circle of any three of them, however a tie has cut it.
         """
         mesh = self.mesh
-        radii = inscribed_circles(mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip))
+
+        def circles(vertices: np.ndarray) -> np.ndarray:
+            return inscribed_circles(vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip))
+
+        radii = circles(mesh.facet_vertices[self.first_facets])
+        throat, triples = self._triples
+        if len(throat):
+            least = np.full(len(self), np.inf)
+            found = circles(triples)
+            np.minimum.at(least, throat, np.where(found > 0.0, found, np.inf))
+            radii = np.where(np.isfinite(least), least, radii)
+        return radii
+
+    @cached_property
+    def _triples(self) -> tuple[np.ndarray, np.ndarray]:
+        """All triples of vertices, a sphere first, of each throat that a tie has cut: throats (p,), vertices (p, 3)."""
+        mesh = self.mesh
+        polygons: dict[int, set[int]] = {}
         further, first, _ = self._further
-        np.minimum.at(radii, first, radii[further])
-        return radii[self.first_facets]
+        for facet, start in zip(further, first, strict=True):
+            corners = polygons.setdefault(int(start), set(mesh.facet_vertices[start].tolist()))
+            corners.update(mesh.facet_vertices[facet].tolist())
+        rows = [
+            (start, *triple)
+            for start, corners in polygons.items()
+            for triple in combinations(sorted(corners), 3)  # walls come last: their numbers follow the spheres'
+            if triple[0] < mesh.n_spheres
+        ]
+        table = np.array(rows, np.int32).reshape(-1, 4)
+        return self.facet_throat[table[:, 0]], table[:, 1:].copy()
 
     def mirror_images(self, slip: np.ndarray) -> np.ndarray:
         """(t,): 1, 2 or 4: how many images of itself a throat makes up with its walls of symmetry, (6,) bool."""
-        mirrors = np.concatenate([np.zeros(self.mesh.n_spheres, bool), slip])
-        return 2.0 ** mirrors[self.mesh.facet_vertices[self.first_facets]].sum(axis=1)
+        images = np.ones(len(self))
+        for wall in np.flatnonzero(slip):
+            has = (self.mesh.facet_vertices == self.mesh.n_spheres + wall).any(axis=1)
+            images[self._total(has.astype(float)) > 0.0] *= 2.0
+        return images
 
     @cached_property
     def closed(self) -> np.ndarray:

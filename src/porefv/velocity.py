@@ -25,9 +25,11 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
     -------
     (n_pores, 3) array [m/s]; zero for pores without volume.
     """
-    first = mesh.throats.first_facets
-    centres = facet_centroids(mesh.facet_vertices[first], mesh.n_spheres, mesh.local_points, mesh.sizes)
-    i, j = mesh.throats.pores.T
+    throats = mesh.throats
+    facets = facet_centroids(mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes)
+    centres = throats.total_by_facet(throats.facet_areas[:, None] * facets)[throats.first_facets]
+    centres /= np.maximum(throats.areas, np.finfo(float).tiny)[:, None]
+    i, j = throats.pores.T
     faces = mesh.wall_faces
     pores = mesh.cell_pore[faces.cells]
     moments = np.empty((mesh.n_pores, 3))
