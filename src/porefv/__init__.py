@@ -8,10 +8,14 @@ Everything public is reachable from here and loaded when first used::
     flow.permeability, flow.pressure, flow.forces.total
 """
 
+import os
 from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
+
+# With TBB, which numba would take first, every call of a parallel kernel is slower than the one before.
+os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
 _HOME = {
     "Box": "packing",
