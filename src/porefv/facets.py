@@ -14,6 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from porefv.union_find import join
+
 _NEXT = (1, 2, 0)
 _LAST = (2, 0, 1)
 
@@ -78,13 +80,7 @@ def unite(facet_cells, facet_vertices, vertices, n, sizes, tolerance):
             if facet_vertices[f, v] < n:
                 radius = min(radius, sizes[facet_vertices[f, v]])
         if square <= (tolerance * radius) ** 2:
-            while parent[i] != i:
-                parent[i] = parent[parent[i]]
-                i = parent[i]
-            while parent[j] != j:
-                parent[j] = parent[parent[j]]
-                j = parent[j]
-            parent[max(i, j)] = min(i, j)
+            join(parent, i, j)
     count = 0
     for t in range(parent.shape[0]):  # a root comes before all that hang on it
         if parent[t] == t:

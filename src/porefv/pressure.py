@@ -10,6 +10,7 @@ from numba import njit
 from porefv.errors import ComputationError
 from porefv.network import Network
 from porefv.solvers import SolverReport, solve
+from porefv.union_find import join
 
 
 @dataclass(frozen=True)
@@ -98,15 +99,7 @@ def _reached(pairs, weights, sources):
     parent = np.arange(n)
     for t in range(pairs.shape[0]):
         if weights[t] > 0.0:
-            i = pairs[t, 0]
-            j = pairs[t, 1]
-            while parent[i] != i:
-                parent[i] = parent[parent[i]]
-                i = parent[i]
-            while parent[j] != j:
-                parent[j] = parent[parent[j]]
-                j = parent[j]
-            parent[max(i, j)] = min(i, j)
+            join(parent, pairs[t, 0], pairs[t, 1])
     reached = np.zeros(n, np.bool_)
     for i in range(n):  # a root comes before all that hang on it
         parent[i] = parent[parent[i]]
