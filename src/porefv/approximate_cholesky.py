@@ -23,9 +23,11 @@ from porefv.errors import ComputationError
 from porefv.network import Network
 
 _GROUND = -1
+# One end of a link, as its node's list holds it. One record, so that following a list misses the cache once a link.
+_HALF_LINK = np.dtype([("weight", np.float64), ("other", np.int32), ("following", np.int32)])
 # Nodes from which two parts pay, and the size beyond which there are more of them.
 _CUT_FROM = 20_000
-_PART = 400_000
+_PART = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ class ApproximateCholesky:
                 network.starts, network.columns, network.links, network.leaks, separator, local,
                 bounds[part], bounds[part + 1],
             )  # fmt: skip
-            order, *column, kept, strengths, ground = eliminate(starts, columns, links, leaks, len(inner))
+            order, *column, kept, strengths, ground = _eliminated(starts, columns, links, leaks, len(inner))
             starts, rows, factors, pivots = column
             nodes = np.concatenate([inner, outer])
             return inner[order], starts, nodes[rows], factors, pivots, nodes[kept], strengths, outer, ground
@@ -104,16 +106,14 @@ class ApproximateCholesky:
         pairs = np.concatenate([given[0]] + [separator[piece[5]] for piece in pieces])
         strengths = np.concatenate([given[1]] + [piece[6] for piece in pieces])
         rest = Network.from_links(pairs, strengths, leaks)
-        order, starts, rows, factors, pivots, *_ = eliminate(
+        order, starts, rows, factors, pivots, *_ = _eliminated(
             rest.starts, rest.columns, rest.links, rest.leaks, len(rest)
         )
         return nodes[order], starts, nodes[rows], factors, pivots
 
-    def apply(self, r: np.ndarray) -> tuple[np.ndarray, float]:
-        """z = (L D Lᵀ)⁻¹ r, (n,), and the product r·z."""
-        z = np.empty_like(r)
-        product = substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z)
-        return z, product
+    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+        """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z. `y`, (n,), is room to work in."""
+        return substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z, y)
 
 
 @njit(cache=True)
@@ -197,12 +197,23 @@ def _links_within(starts, columns, links, separator, nodes):
     return pairs[:count].copy(), strengths[:count].copy()
 
 
-@njit(cache=True, nogil=True)
-def eliminate(starts, columns, links, leaks, n):
+def _eliminated(starts, columns, links, leaks, n):
+    """`eliminate`, with memory from numpy, which large arrays get in large pages."""
+    # Each elimination frees about as many half-links as it makes, so the initial room nearly suffices.
+    room = len(columns) + 64
+    half_links = np.empty(room, _HALF_LINK)
+    return eliminate(
+        starts, columns, links, leaks, n, half_links, np.empty(2 * room, np.int32), np.empty(2 * room, np.float32)
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
     """Eliminate the first n nodes, the least connected first, in sweeps along the numbering.
 
     Links live in lists of half-links, one list for each of these nodes; a half-link whose other end is gone is
-    dropped when met. Nodes from n on are kept: fill between two of them is given back.
+    dropped when met. Nodes from n on are kept: fill between two of them is given back. Arrays of half-links, rows and
+    factors are given, to be filled.
 
     Returns
     -------
@@ -213,34 +224,30 @@ def eliminate(starts, columns, links, leaks, n):
     """
     np.random.seed(0)
     n_all = leaks.shape[0]
-    # Each elimination frees about as many half-links as it makes, so the initial room nearly suffices.
-    room = columns.shape[0] + 64
-    head = np.full(n, -1, np.int64)
-    following = np.empty(room, np.int64)
-    other = np.empty(room, np.int32)
-    weight = np.empty(room)
+    head = np.full(n, -1, np.int32)
     degree = np.zeros(n, np.int32)
     ground = leaks.copy()
     used = 0
     for i in range(n):
         for k in range(starts[i], starts[i + 1]):
-            following[used] = head[i]
-            other[used] = columns[k]
-            weight[used] = links[k]
+            half_links[used].following = head[i]
+            half_links[used].other = columns[k]
+            half_links[used].weight = links[k]
             head[i] = used
             used += 1
             degree[i] += 1
-    unused = np.int64(-1)
+    unused = np.int32(-1)
 
     done = np.zeros(n_all, np.bool_)
     slot = np.full(n_all, -1, np.int32)
     near = np.empty(64, np.int32)
     w = np.empty(64)
+    rest = np.empty(64)
+    active = np.arange(n, dtype=np.int32)
+    n_active = n
     order = np.empty(n, np.int32)
     pivots = np.empty(n)
     factor_starts = np.zeros(n + 1, np.int64)
-    rows = np.empty(2 * room, np.int32)
-    factors = np.empty(2 * room, np.float32)
     filled = 0
     kept = np.empty((64, 2), np.int32)
     strengths = np.empty(64)
@@ -249,29 +256,34 @@ def eliminate(starts, columns, links, leaks, n):
     limit = 3
     while eliminated < n:
         before = eliminated
-        for i in range(n):
-            if done[i] or degree[i] > limit:
+        waiting = 0
+        for place in range(n_active):
+            i = active[place]
+            if degree[i] > limit:
+                active[waiting] = i
+                waiting += 1
                 continue
             # Gather the neighbours, parallel links added up.
             m = 0
             link = head[i]
             while link >= 0:
-                j = other[link]
+                j = half_links[link].other
                 if not done[j]:
                     if slot[j] >= 0:
-                        w[slot[j]] += weight[link]
+                        w[slot[j]] += half_links[link].weight
                     else:
                         if m + 2 > near.shape[0]:
                             near = _doubled(near)
                             w = _doubled(w)
+                            rest = _doubled(rest)
                         slot[j] = m
                         near[m] = j
-                        w[m] = weight[link]
+                        w[m] = half_links[link].weight
                         m += 1
                     if j < n:
                         degree[j] -= 1
-                after = following[link]
-                following[link] = unused
+                after = half_links[link].following
+                half_links[link].following = unused
                 unused = link
                 link = after
             total = ground[i]
@@ -306,11 +318,11 @@ def eliminate(starts, columns, links, leaks, n):
                     p -= 1
                 w[p] = key
                 near[p] = node
+            rest[m - 1] = 0.0
+            for q in range(m - 2, -1, -1):
+                rest[q] = rest[q + 1] + w[q + 1]
             for q in range(m - 1):
-                rest = 0.0
-                for p in range(q + 1, m):
-                    rest += w[p]
-                aim = np.random.random() * rest
+                aim = np.random.random() * rest[q]
                 p = q + 1
                 passed = w[p]
                 while passed < aim and p < m - 1:
@@ -318,7 +330,7 @@ def eliminate(starts, columns, links, leaks, n):
                     passed += w[p]
                 a = near[q]
                 b = near[p]
-                strength = w[q] * rest / total
+                strength = w[q] * rest[q] / total
                 if a == _GROUND:
                     ground[b] += strength
                 elif b == _GROUND:
@@ -338,19 +350,18 @@ def eliminate(starts, columns, links, leaks, n):
                             continue
                         link = unused
                         if link >= 0:
-                            unused = following[link]
+                            unused = half_links[link].following
                         else:
-                            if used == following.shape[0]:
-                                following = _doubled(following)
-                                other = _doubled(other)
-                                weight = _doubled(weight)
-                            link = np.int64(used)
+                            if used == half_links.shape[0]:
+                                half_links = _doubled(half_links)
+                            link = np.int32(used)
                             used += 1
-                        following[link] = head[x]
+                        half_links[link].following = head[x]
                         head[x] = link
-                        other[link] = b if end == 0 else a
-                        weight[link] = strength
+                        half_links[link].other = b if end == 0 else a
+                        half_links[link].weight = strength
                         degree[x] += 1
+        n_active = waiting
         if eliminated - before < 0.3 * (n - before):
             limit += max(1, limit // 2)
     return (
@@ -360,26 +371,15 @@ def eliminate(starts, columns, links, leaks, n):
 
 
 @njit(cache=True, parallel=True)
-def substitute(order, parts, starts, rows, factors, pivots, r, z):
-    """z = (L D Lᵀ)⁻¹ r; returns r·z."""
+def substitute(order, parts, starts, rows, factors, pivots, r, z, y):
+    """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z."""
     n = order.shape[0]
     n_parts = parts.shape[0] - 1
     n_inner = parts[n_parts]
-    y = np.empty(n)
     shares = np.zeros((n_parts, n - n_inner))
     products = np.zeros(n_parts + 1)
     for part in prange(n_parts):
-        first = parts[part]
-        last = parts[part + 1]
-        for k in range(first, last):
-            y[k] = r[order[k]]
-        for k in range(first, last):
-            v = y[k]
-            for e in range(starts[k], starts[k + 1]):
-                if rows[e] < n_inner:
-                    y[rows[e]] += factors[e] * v
-                else:
-                    shares[part, rows[e] - n_inner] += factors[e] * v
+        _forward(parts[part], parts[part + 1], n_inner, order, starts, rows, factors, r, y, shares[part])
     for k in range(n_inner, n):
         y[k] = r[order[k]]
         for part in range(n_parts):
@@ -388,22 +388,38 @@ def substitute(order, parts, starts, rows, factors, pivots, r, z):
         v = y[k]
         for e in range(starts[k], starts[k + 1]):
             y[rows[e]] += factors[e] * v
-    for k in range(n - 1, n_inner - 1, -1):
+    products[n_parts] = _backward(n_inner, n, order, starts, rows, factors, pivots, r, z, y)
+    for part in prange(n_parts):
+        products[part] = _backward(parts[part], parts[part + 1], order, starts, rows, factors, pivots, r, z, y)
+    return products.sum()
+
+
+@njit(cache=True)
+def _forward(first, last, n_inner, order, starts, rows, factors, r, y, share):
+    """y = L⁻¹ r for one part, and its share of the separator's right-hand side."""
+    for k in range(first, last):
+        y[k] = r[order[k]]
+    for k in range(first, last):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            if rows[e] < n_inner:
+                y[rows[e]] += factors[e] * v
+            else:
+                share[rows[e] - n_inner] += factors[e] * v
+
+
+@njit(cache=True, error_model="numpy")
+def _backward(first, last, order, starts, rows, factors, pivots, r, z, y):
+    """y and z = L⁻ᵀ D⁻¹ y for one part; returns its part of r·z."""
+    product = 0.0
+    for k in range(last - 1, first - 1, -1):
         s = y[k] / pivots[k]
         for e in range(starts[k], starts[k + 1]):
             s += factors[e] * y[rows[e]]
         y[k] = s
         z[order[k]] = s
-        products[n_parts] += s * r[order[k]]
-    for part in prange(n_parts):
-        for k in range(parts[part + 1] - 1, parts[part] - 1, -1):
-            s = y[k] / pivots[k]
-            for e in range(starts[k], starts[k + 1]):
-                s += factors[e] * y[rows[e]]
-            y[k] = s
-            z[order[k]] = s
-            products[part] += s * r[order[k]]
-    return products.sum()
+        product += s * r[order[k]]
+    return product
 
 
 @njit(cache=True)

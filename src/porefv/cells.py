@@ -10,8 +10,7 @@ from porefv.facets import (
     _dot,
     _height,
     _overlaps,
-    _plane_distance,
-    _tangent,
+    _plane_distances,
     _towards,
     area_vector,
     centroid,
@@ -82,7 +81,7 @@ def cell_solids(cells, n, points, sizes):
                 edge = u if j == 0 else (v if j == 1 else w)
                 if not _overlaps(k, m, edge, n, points, sizes):
                     continue
-                d = min(max(_plane_distance(k, m, edge, n, points, sizes), -r), r)
+                d, _ = _plane_distances(k, m, edge, n, points, sizes)
                 a = _cross(edge, v if j == 0 else (w if j == 1 else u))
                 b = _cross(edge, w if j == 0 else (u if j == 1 else v))
                 x = _cross(a, b)
@@ -122,3 +121,12 @@ def enumerate_wall_faces(cells, n, points, sizes):
                 centroids[f, axis] = x[axis] + gap * direction[axis]
             f += 1
     return face_cells, walls, areas, centroids
+
+
+@njit(cache=True)
+def _tangent(u, v, w):
+    """(numerator, denominator) of tan(Ω/2) for the triangle u, v, w (Van Oosterom and Strackee 1983)."""
+    lu = np.sqrt(_dot(u, u))
+    lv = np.sqrt(_dot(v, v))
+    lw = np.sqrt(_dot(w, w))
+    return _dot(_cross(u, v), w), lu * lv * lw + _dot(u, v) * lw + _dot(v, w) * lu + _dot(w, u) * lv

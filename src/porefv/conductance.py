@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numba import njit, prange
 
 from porefv.errors import InputError
 from porefv.throats import Throats
@@ -51,11 +52,7 @@ class HydraulicRadius:
             raise InputError(f"alpha must be a positive number, not {self.alpha!r}")
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
-        volumes = throats.volumes
-        surfaces = throats.wetted_surfaces(slip)
-        sound = (volumes > 0.0) & (surfaces > 0.0)
-        radii = np.divide(volumes, surfaces, out=np.zeros(len(throats)), where=sound)
-        return self.alpha * throats.fluid_areas * radii**2
+        return _hydraulic_radius(self.alpha, throats.fluid_areas, throats.volumes, throats.wetted_surfaces(slip))
 
 
 @dataclass(frozen=True)
@@ -74,6 +71,16 @@ class EffectiveRadius:
         equivalent = np.sqrt(images * np.maximum(throats.fluid_areas, 0.0) / np.pi)
         radii = 0.25 * (equivalent + throats.inscribed_radii(slip))
         return np.where(radii > 0.0, 2.0 * np.pi * radii**4 / images, 0.0)
+
+
+@njit(cache=True, parallel=True)
+def _hydraulic_radius(alpha, areas, volumes, surfaces):
+    """α A^f (φ / Σγ)², zero where φ or Σγ is not positive."""
+    conductivity = np.zeros_like(areas)
+    for t in prange(areas.shape[0]):
+        if volumes[t] > 0.0 and surfaces[t] > 0.0:
+            conductivity[t] = alpha * areas[t] * (volumes[t] / surfaces[t]) ** 2
+    return conductivity
 
 
 MODELS = {model.name: model for model in (HydraulicRadius, EffectiveRadius)}

@@ -13,6 +13,8 @@ from porefv.network import Network
 
 _BLOCK = 16384
 _MAX_ITERATIONS = 500
+# Iterations between two looks at what the tolerance is measured against.
+_LOOK_EVERY = 4
 
 
 def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -21,8 +23,12 @@ def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, 
     The flow is half of all that enters or leaves; Σ ε d|x| is what rounding x to double precision alone may lose.
     """
     lost = float(np.abs(network.residual(rhs, x)).sum())
-    flow = 0.5 * float(np.abs(network.leaks * x - rhs).sum())
-    return lost, flow, float(np.finfo(float).eps * (network.diagonal * np.abs(x)).sum())
+    return lost, *_measures(network, rhs, x)
+
+
+def _measures(network, rhs, x):
+    flow, size = _flow_and_size(network.leaks, network.diagonal, rhs, x)
+    return 0.5 * flow, float(np.finfo(float).eps) * size
 
 
 def conjugate_gradients(
@@ -36,31 +42,47 @@ def conjugate_gradients(
     """
     a = network
     x = np.zeros(len(a))
-    r = rhs.copy()
+    z, ap, room = np.empty((3, len(a)))
     iterations = 0
     before = np.inf
     while True:
         # (Re)start from the true residual: the recurrence drifts from it by rounding.
-        lost, flow, floor = imbalance(a, rhs, x)
+        r = a.residual(rhs, x)
+        lost = float(np.abs(r).sum())
+        flow, floor = _measures(a, rhs, x)
         if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= _MAX_ITERATIONS:
             return x, iterations
         before = lost
-        r = a.residual(rhs, x)
-        z, rz = preconditioner.apply(r)
+        rz = preconditioner.apply(r, z, room)
         p = z.copy()
-        ap = np.empty(len(a))
+        enough = 0.0
         while iterations < _MAX_ITERATIONS:
             iterations += 1
             alpha = rz / _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
-            lost, flow, size = _advance(x, r, p, ap, alpha, a.leaks, a.diagonal, rhs)
-            if lost <= 0.5 * max(tolerance * 0.5 * flow, np.finfo(float).eps * size):
+            lost = _advance(x, r, p, ap, alpha)
+            if iterations % _LOOK_EVERY == 0:
+                flow, floor = _measures(a, rhs, x)
+                enough = 0.5 * max(tolerance * flow, floor)
+            if lost <= enough:
                 break
-            z, new = preconditioner.apply(r)
+            new = preconditioner.apply(r, z, room)
             if not new > 0.0:
                 break
-            p *= new / rz
-            p += z
+            _redirect(p, z, new / rz)
             rz = new
+
+
+@njit(cache=True, parallel=True)
+def _flow_and_size(leaks, diagonal, rhs, x):
+    """Σ|e x - b| and Σ d|x|."""
+    n = x.shape[0]
+    flow = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    size = np.zeros(flow.shape[0])
+    for block in prange(flow.shape[0]):
+        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
+            flow[block] += abs(leaks[i] * x[i] - rhs[i])
+            size[block] += diagonal[i] * abs(x[i])
+    return flow.sum(), size.sum()
 
 
 @njit(cache=True, parallel=True)
@@ -81,18 +103,22 @@ def _multiply(starts, columns, links, leaks, p, ap):
 
 
 @njit(cache=True, parallel=True)
-def _advance(x, r, p, ap, alpha, leaks, diagonal, rhs):
-    """x += α p, r -= α ap; returns Σ|r|, Σ|e x - b| and Σ d|x|."""
+def _advance(x, r, p, ap, alpha):
+    """x += α p, r -= α ap; returns Σ|r|."""
     n = p.shape[0]
-    n_blocks = (n + _BLOCK - 1) // _BLOCK
-    lost = np.zeros(n_blocks)
-    flow = np.zeros(n_blocks)
-    size = np.zeros(n_blocks)
-    for block in prange(n_blocks):
+    lost = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    for block in prange(lost.shape[0]):
+        total = 0.0
         for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
             x[i] += alpha * p[i]
             r[i] -= alpha * ap[i]
-            lost[block] += abs(r[i])
-            flow[block] += abs(leaks[i] * x[i] - rhs[i])
-            size[block] += diagonal[i] * abs(x[i])
-    return lost.sum(), flow.sum(), size.sum()
+            total += abs(r[i])
+        lost[block] = total
+    return lost.sum()
+
+
+@njit(cache=True, parallel=True)
+def _redirect(p, z, beta):
+    """p = z + β p."""
+    for i in prange(p.shape[0]):
+        p[i] = z[i] + beta * p[i]

@@ -16,9 +16,6 @@ from numba import njit, prange
 
 from porefv.union_find import join
 
-_NEXT = (1, 2, 0)
-_LAST = (2, 0, 1)
-
 
 @njit(cache=True)
 def spheres_first(a, b, c, n):
@@ -29,15 +26,8 @@ def spheres_first(a, b, c, n):
 
 
 @njit(cache=True)
-def enumerate_facets(cells, neighbours, n):
-    """Facets between cells t < u as (cells (f, 2), vertices (f, 3)), in the order of t."""
-    count = 0
-    for t in range(cells.shape[0]):
-        for i in range(4):
-            if neighbours[t, i] > t:
-                count += 1
-    facet_cells = np.empty((count, 2), np.int32)
-    vertices = np.empty((count, 3), np.int32)
+def enumerate_facets(cells, neighbours, n, facet_cells, vertices):
+    """Facets between cells t < u, their cells (f, 2) and vertices (f, 3), in the order of t; returns f."""
     f = 0
     for t in range(cells.shape[0]):
         for i in range(4):
@@ -59,7 +49,7 @@ def enumerate_facets(cells, neighbours, n):
             vertices[f, 1] = b
             vertices[f, 2] = c
             f += 1
-    return facet_cells, vertices
+    return f
 
 
 @njit(cache=True)
@@ -89,6 +79,28 @@ def unite(facet_cells, facet_vertices, vertices, n, sizes, tolerance):
         else:
             parent[t] = parent[parent[t]]
     return parent
+
+
+@njit(cache=True)
+def tied_facets(facet_cells, cell_node, cell_pore):
+    """Facets between two pores both of whose Laguerre vertices are shared by several cells."""
+    cells = np.zeros(cell_node.max() + 1, np.int32)
+    for t in range(cell_node.shape[0]):
+        cells[cell_node[t]] += 1
+    found = np.empty(64, np.int64)
+    count = 0
+    for f in range(facet_cells.shape[0]):
+        i = facet_cells[f, 0]
+        j = facet_cells[f, 1]
+        if cells[cell_node[i]] > 1 and cells[cell_node[j]] > 1 and cell_pore[i] != cell_pore[j]:
+            if count == found.shape[0]:
+                larger = np.empty(2 * count, np.int64)
+                for k in range(count):
+                    larger[k] = found[k]
+                found = larger
+            found[count] = f
+            count += 1
+    return found[:count].copy()
 
 
 @njit(cache=True)
@@ -152,55 +164,88 @@ def centroid(a, b, c, n, points, sizes):
     )
 
 
-@njit(cache=True, parallel=True)
-def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, areas, sectors, covered):
-    """Unit normal, L = (P_j - P_i)·n, area A, sector areas A^k of each facet, and whether its spheres cover it.
+@njit(cache=True)
+def _plus(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(cache=True)
+def _minus(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True)
+def _times(factor, a):
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@njit(cache=True)
+def _at(i, array):
+    return array[i, 0], array[i, 1], array[i, 2]
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, fluid, sectors, covered):
+    """Unit normal, L = (P_j - P_i)·n, A^f, sector areas A^k of each facet, and whether its spheres cover it.
 
     They do where its radical centre, the point of equal power in its plane, lies inside of them.
     """
     for f in prange(facet_cells.shape[0]):
-        abc = (facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2])
-        s = area_vector(abc[0], abc[1], abc[2], n, points, sizes)
-        area = np.sqrt(_dot(s, s))
-        length = 0.0
+        a = facet_vertices[f, 0]
+        b = facet_vertices[f, 1]
+        c = facet_vertices[f, 2]
+        ab = _towards(a, b, n, points)
+        ac = _towards(a, c, n, points)
+        # The vector of the facet's sense; |ab x ac| belongs to the angles at all three vertices.
+        cross = _cross(ab, ac)
+        twice = np.sqrt(_dot(cross, cross))
+        normal = _times(1.0 / twice if twice > 0.0 else 0.0, cross)
+        ra = sizes[a]
+        if c < n:
+            area = 0.5 * twice
+            angle_a = np.arctan2(twice, _dot(ab, ac))
+            angle_b = np.arctan2(twice, _dot(_minus(ab, ac), ab))
+            sectors[f, 0] = 0.5 * angle_a * ra * ra
+            sectors[f, 1] = 0.5 * angle_b * sizes[b] * sizes[b]
+            sectors[f, 2] = 0.5 * (np.pi - angle_a - angle_b) * sizes[c] * sizes[c]
+            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
+            _cut_sectors(f, 1, 2, b, c, _minus(ac, ab), n, points, sizes, sectors)
+            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
+        elif b < n:
+            area = 0.5 * (_height(a, c, points, sizes) + _height(b, c, points, sizes)) * twice
+            angle_a = np.arctan2(twice, _dot(ab, ac))
+            sectors[f, 0] = 0.5 * angle_a * ra * ra
+            sectors[f, 1] = 0.5 * (np.pi - angle_a) * sizes[b] * sizes[b]
+            sectors[f, 2] = 0.0
+            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
+            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
+            _cut_sectors(f, 1, 2, b, c, ac, n, points, sizes, sectors)
+        else:
+            area = _height(a, b, points, sizes) * _height(a, c, points, sizes)
+            sectors[f, 0] = 0.25 * np.pi * ra * ra
+            sectors[f, 1] = 0.0
+            sectors[f, 2] = 0.0
+            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
+            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
+        fluid[f] = area - (sectors[f, 0] + sectors[f, 1] + sectors[f, 2])
+        pi = _at(facet_cells[f, 0], vertices)
+        lengths[f] = _dot(normal, _minus(_at(facet_cells[f, 1], vertices), pi))
+        gap = _minus(_at(a, points), pi)
+        above = _dot(gap, normal)
+        covered[f] = _dot(gap, gap) - ra * ra <= above * above
         for axis in range(3):
-            normals[f, axis] = s[axis] / area if area > 0.0 else 0.0
-            i = facet_cells[f, 0]
-            j = facet_cells[f, 1]
-            length += normals[f, axis] * (vertices[j, axis] - vertices[i, axis])
-        areas[f] = area
-        lengths[f] = length
-        k = abc[0]
-        power = -sizes[k] * sizes[k]
-        above = 0.0
-        for axis in range(3):
-            gap = points[k, axis] - vertices[facet_cells[f, 0], axis]
-            power += gap * gap
-            above += gap * normals[f, axis]
-        covered[f] = power <= above * above
-        rest = np.pi  # the angles at the spheres of a triangle or trapezoid add up to π
-        for v in range(3):
-            k = abc[v]
-            sectors[f, v] = 0.0
-            if k >= n:
-                continue
-            b = abc[_NEXT[v]]
-            c = abc[_LAST[v]]
-            u = _towards(k, b, n, points)
-            w = _towards(k, c, n, points)
-            if abc[1] >= n:
-                angle = 0.5 * np.pi
-            elif v == 2 or (v == 1 and abc[2] >= n):
-                angle = rest
-            else:
-                x = _cross(u, w)
-                angle = np.arctan2(np.sqrt(_dot(x, x)), _dot(u, w))
-                rest -= angle
-            sectors[f, v] = 0.5 * angle * sizes[k] * sizes[k]
-            if _overlaps(k, b, u, n, points, sizes):
-                sectors[f, v] -= _half_segment(k, b, u, n, points, sizes)
-            if _overlaps(k, c, w, n, points, sizes):
-                sectors[f, v] -= _half_segment(k, c, w, n, points, sizes)
+            normals[f, axis] = normal[axis]
+
+
+@njit(cache=True)
+def _cut_sectors(f, i, j, k, m, u, n, points, sizes, sectors):
+    """Take from the sectors of vertices k and m of facet f what reaches beyond the Laguerre plane between them."""
+    if not _overlaps(k, m, u, n, points, sizes):
+        return
+    d, beyond = _plane_distances(k, m, u, n, points, sizes)
+    sectors[f, i] -= _half_segment(sizes[k], d)
+    if m < n:
+        sectors[f, j] -= _half_segment(sizes[m], beyond)
 
 
 @njit(cache=True)
@@ -211,25 +256,29 @@ def _overlaps(k, m, u, n, points, sizes):
     return _dot(u, u) < (sizes[k] + sizes[m]) * (sizes[k] + sizes[m])
 
 
-@njit(cache=True)
-def _plane_distance(k, m, u, n, points, sizes):
-    """Distance from centre k to the Laguerre plane towards m; u is the vector (direction) to m."""
-    if m >= n:
-        return _height(k, m, points, sizes)
-    square = _dot(u, u)
-    return 0.5 * (square + (sizes[k] - sizes[m]) * (sizes[k] + sizes[m])) / np.sqrt(square)
+@njit(cache=True, error_model="numpy")
+def _plane_distances(k, m, u, n, points, sizes):
+    """Distances of centres k and m from the Laguerre plane between them, each within its radius.
 
-
-@njit(cache=True)
-def _half_segment(k, m, u, n, points, sizes):
-    """Half the part of the disc of sphere k beyond the Laguerre plane towards m, which it overlaps."""
+    u leads from k to m. Of a wall, the second distance has no meaning.
+    """
     r = sizes[k]
-    d = min(max(_plane_distance(k, m, u, n, points, sizes), -r), r)
+    if m >= n:
+        return min(max(_height(k, m, points, sizes), -r), r), 0.0
+    square = _dot(u, u)
+    length = np.sqrt(square)
+    d = 0.5 * (square + (r - sizes[m]) * (r + sizes[m])) / length
+    return min(max(d, -r), r), min(max(length - d, -sizes[m]), sizes[m])
+
+
+@njit(cache=True)
+def _half_segment(r, d):
+    """Half the part of a disc of radius r beyond a chord at distance d from its centre."""
     chord = np.sqrt((r - d) * (r + d))
     return 0.5 * (r * r * np.arctan2(chord, d) - d * chord)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def facet_volumes(facet_cells, facet_vertices, vertices, n, points, sizes, volumes, surfaces):
     """Void volume φ of each throat and the solid surface γ^k of each of its vertices, walls included.
 
@@ -237,100 +286,131 @@ def facet_volumes(facet_cells, facet_vertices, vertices, n, points, sizes, volum
     A L / 3, computed as S·(P_j - P_i) / 3 so that sums telescope exactly.
     """
     for f in prange(facet_cells.shape[0]):
-        abc = (facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2])
-        i = facet_cells[f, 0]
-        j = facet_cells[f, 1]
-        pi = (vertices[i, 0], vertices[i, 1], vertices[i, 2])
-        pj = (vertices[j, 0], vertices[j, 1], vertices[j, 2])
-        axis = (pj[0] - pi[0], pj[1] - pi[1], pj[2] - pi[2])
-        s = area_vector(abc[0], abc[1], abc[2], n, points, sizes)
-        area = np.sqrt(_dot(s, s))
-        inverse = 1.0 / area if area > 0.0 else 0.0
-        normal = (s[0] * inverse, s[1] * inverse, s[2] * inverse)
-        length = _dot(axis, normal)
-        volume = _dot(axis, s) / 3.0
-        for v in range(3):
-            surfaces[f, v] = 0.0
-        for v in range(3):
-            k = abc[v]
-            if k >= n:
-                # The wall's share of Ω_ij: two triangles on the trace of the facet.
-                trace = _trace(abc, v, n, points, sizes)
-                surfaces[f, v] += 0.5 * length * trace
-                continue
-            b = abc[_NEXT[v]]
-            c = abc[_LAST[v]]
-            u = _towards(k, b, n, points)
-            w = _towards(k, c, n, points)
-            qi = (pi[0] - points[k, 0], pi[1] - points[k, 1], pi[2] - points[k, 2])
-            qj = (pj[0] - points[k, 0], pj[1] - points[k, 1], pj[2] - points[k, 2])
-            r = sizes[k]
-            omega = _solid_angle_between(u, w, qi, qj)
-            surfaces[f, v] += omega * r * r
-            volume -= omega * r * r * r / 3.0
-            for turn in range(2):
-                m = b if turn == 0 else c
-                edge = u if turn == 0 else w
-                if not _overlaps(k, m, edge, n, points, sizes):
-                    continue
-                d = min(max(_plane_distance(k, m, edge, n, points, sizes), -r), r)
-                psi = _dihedral(edge, normal, qi, qj)
-                if turn == 1:  # the facet lies on the other side of this edge
-                    psi = _dihedral((-edge[0], -edge[1], -edge[2]), normal, qi, qj)
-                h = r - d
-                volume += psi * h * h * (3.0 * r - h) / 6.0
-                surfaces[f, v] -= psi * r * h
-                if m >= n:
-                    surfaces[f, _NEXT[v] if turn == 0 else _LAST[v]] -= 0.5 * psi * (r - d) * (r + d)
+        a = facet_vertices[f, 0]
+        b = facet_vertices[f, 1]
+        c = facet_vertices[f, 2]
+        ab = _towards(a, b, n, points)
+        ac = _towards(a, c, n, points)
+        cross = _cross(ab, ac)
+        twice = np.sqrt(_dot(cross, cross))
+        # P_i and P_j from the first sphere; their heights over the facet's plane, times `twice`.
+        qi = _minus(_at(facet_cells[f, 0], vertices), _at(a, points))
+        qj = _minus(_at(facet_cells[f, 1], vertices), _at(a, points))
+        hi = _dot(cross, qi)
+        hj = _dot(cross, qj)
+        half_length = 0.5 * (hj - hi) / twice if twice > 0.0 else 0.0
+        ra = sizes[a]
+        if c < n:
+            bc = _minus(ac, ab)
+            ba = _times(-1.0, ab)
+            lab = np.sqrt(_dot(ab, ab))
+            lbc = np.sqrt(_dot(bc, bc))
+            lac = np.sqrt(_dot(ac, ac))
+            at_a = _solid_angle(ab, lab, ac, lac, qi, hi, qj, hj)
+            at_b = _solid_angle(bc, lbc, ba, lab, _plus(qi, ba), hi, _plus(qj, ba), hj)
+            at_c = _solid_angle(ac, lac, bc, lbc, _minus(ac, qi), hi, _minus(ac, qj), hj)
+            rb = sizes[b]
+            rc = sizes[c]
+            volume = (0.5 * (hj - hi) - at_a * ra * ra * ra - at_b * rb * rb * rb - at_c * rc * rc * rc) / 3.0
+            surfaces[f, 0] = at_a * ra * ra
+            surfaces[f, 1] = at_b * rb * rb
+            surfaces[f, 2] = at_c * rc * rc
+            if lab < ra + rb:
+                volume += _cut_caps(f, 0, 1, a, b, ab, ab, qi, hi, qj, hj, cross, n, points, sizes, surfaces)
+            if lbc < rb + rc:
+                volume += _cut_caps(f, 1, 2, b, c, bc, bc, _plus(qi, ba), hi, _plus(qj, ba), hj, cross,
+                                    n, points, sizes, surfaces)  # fmt: skip
+            if lac < ra + rc:
+                volume += _cut_caps(f, 0, 2, a, c, ac, _times(-1.0, ac), qi, hi, qj, hj, cross,
+                                    n, points, sizes, surfaces)  # fmt: skip
+        elif b < n:
+            ba = _times(-1.0, ab)
+            lab = np.sqrt(_dot(ab, ab))
+            bi = _plus(qi, ba)
+            bj = _plus(qj, ba)
+            at_a = _solid_angle(ab, lab, ac, 1.0, qi, hi, qj, hj)
+            at_b = _solid_angle(ac, 1.0, ba, lab, bi, hi, bj, hj)
+            rb = sizes[b]
+            factor = 0.5 * (_height(a, c, points, sizes) + _height(b, c, points, sizes))
+            volume = (factor * (hj - hi) - at_a * ra * ra * ra - at_b * rb * rb * rb) / 3.0
+            surfaces[f, 0] = at_a * ra * ra
+            surfaces[f, 1] = at_b * rb * rb
+            # The wall's share of Ω_ij: two triangles on the trace of the facet.
+            along = _dot(ab, ac)
+            surfaces[f, 2] = half_length * np.sqrt(max(_dot(ab, ab) - along * along, 0.0))
+            if lab < ra + rb:
+                volume += _cut_caps(f, 0, 1, a, b, ab, ab, qi, hi, qj, hj, cross, n, points, sizes, surfaces)
+            if _height(b, c, points, sizes) < rb:
+                volume += _cut_caps(f, 1, 2, b, c, ac, ac, bi, hi, bj, hj, cross, n, points, sizes, surfaces)
+            if _height(a, c, points, sizes) < ra:
+                volume += _cut_caps(f, 0, 2, a, c, ac, _times(-1.0, ac), qi, hi, qj, hj, cross,
+                                    n, points, sizes, surfaces)  # fmt: skip
+        else:
+            at_a = _solid_angle(ab, 1.0, ac, 1.0, qi, hi, qj, hj)
+            to_b = _height(a, b, points, sizes)
+            to_c = _height(a, c, points, sizes)
+            volume = (to_b * to_c * (hj - hi) - at_a * ra * ra * ra) / 3.0
+            surfaces[f, 0] = at_a * ra * ra
+            surfaces[f, 1] = half_length * to_c
+            surfaces[f, 2] = half_length * to_b
+            if to_b < ra:
+                volume += _cut_caps(f, 0, 1, a, b, ab, ab, qi, hi, qj, hj, cross, n, points, sizes, surfaces)
+            if to_c < ra:
+                volume += _cut_caps(f, 0, 2, a, c, ac, _times(-1.0, ac), qi, hi, qj, hj, cross,
+                                    n, points, sizes, surfaces)  # fmt: skip
         volumes[f] = volume
 
 
 @njit(cache=True)
-def _trace(abc, v, n, points, sizes):
-    """Length of the facet's trace on its wall abc[v]."""
-    wall = abc[v]
-    a = abc[0]
-    if abc[1] < n:
-        u = _towards(a, abc[1], n, points)
-        along = _dot(u, (points[wall, 0], points[wall, 1], points[wall, 2]))
-        return np.sqrt(max(_dot(u, u) - along * along, 0.0))
-    return _height(a, abc[3 - v], points, sizes)
+def _solid_angle(u, lu, v, lv, qi, hi, qj, hj):
+    """Signed solid angle of (u, v, qj) less that of (u, v, qi); lengths of u, v and heights (u x v)·q are given.
 
-
-@njit(cache=True)
-def _tangent(u, v, w):
-    """(numerator, denominator) of tan(Ω/2) for the triangle u, v, w (Van Oosterom and Strackee 1983)."""
-    lu = np.sqrt(_dot(u, u))
-    lv = np.sqrt(_dot(v, v))
-    return _tangent_on(u, v, lu * lv + _dot(u, v), lu, lv, _cross(u, v), w)
-
-
-@njit(cache=True)
-def _tangent_on(u, v, base, lu, lv, normal, w):
-    """The same with what depends on the edge u, v alone worked out: base = |u||v| + u·v, normal = u x v."""
-    return _dot(normal, w), base * np.sqrt(_dot(w, w)) + _dot(v, w) * lu + _dot(w, u) * lv
-
-
-@njit(cache=True)
-def _solid_angle_between(u, v, qi, qj):
-    """Signed solid angle of (u, v, qj) less that of (u, v, qi)."""
-    lu = np.sqrt(_dot(u, u))
-    lv = np.sqrt(_dot(v, v))
+    tan(Ω/2) = (u x v)·q / (|u||v||q| + u·v |q| + v·q |u| + q·u |v|) (Van Oosterom and Strackee 1983).
+    """
     base = lu * lv + _dot(u, v)
-    normal = _cross(u, v)
-    ni, di = _tangent_on(u, v, base, lu, lv, normal, qi)
-    nj, dj = _tangent_on(u, v, base, lu, lv, normal, qj)
-    if di > 0.0 and dj > 0.0:  # both halves within ±90°: one arctangent gives the difference
-        return 2.0 * np.arctan2(nj * di - ni * dj, di * dj + ni * nj)
-    return 2.0 * (np.arctan2(nj, dj) - np.arctan2(ni, di))
+    di = base * np.sqrt(_dot(qi, qi)) + _dot(v, qi) * lu + _dot(u, qi) * lv
+    dj = base * np.sqrt(_dot(qj, qj)) + _dot(v, qj) * lu + _dot(u, qj) * lv
+    return 2.0 * _turn(di, hi, dj, hj)
 
 
 @njit(cache=True)
-def _dihedral(edge, normal, qi, qj):
-    """Angle about an edge from the half-plane of qi to that of qj, counted from the facet's own side."""
-    inward = _cross(normal, edge)
-    y = _dot(inward, qi) / np.sqrt(_dot(edge, edge))
-    return np.arctan2(_dot(normal, qj), y) - np.arctan2(_dot(normal, qi), y)
+def _turn(xi, yi, xj, yj):
+    """Angle of (xj, yj) less that of (xi, yi), each within ±180°."""
+    if xi > 0.0 and xj > 0.0:  # both within ±90°: one arctangent gives the difference
+        return np.arctan2(yj * xi - yi * xj, xi * xj + yi * yj)
+    return np.arctan2(yj, xj) - np.arctan2(yi, xi)
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_caps(f, i, j, k, m, u, edge, qi, hi, qj, hj, cross, n, points, sizes, surfaces):
+    """Take the caps of k and m beyond their Laguerre plane from the surfaces; returns their volume in Ω_ij.
+
+    `u` leads from k to m, `edge` is the same line in the facet's cyclic sense, qi and qj are P_i, P_j from a point on
+    it. ψ is the angle about the edge from P_i to P_j, counted from the facet's own side.
+    """
+    inward = _times(1.0 / np.sqrt(_dot(edge, edge)), _cross(cross, edge))
+    psi = _turn(_dot(inward, qi), hi, _dot(inward, qj), hj)
+    r = sizes[k]
+    d, beyond = _plane_distances(k, m, u, n, points, sizes)
+    h = r - d
+    volume = psi * h * h * (3.0 * r - h) / 6.0
+    surfaces[f, i] -= psi * r * h
+    if m >= n:
+        surfaces[f, j] -= 0.5 * psi * (r - d) * (r + d)
+        return volume
+    r = sizes[m]
+    h = r - beyond
+    surfaces[f, j] -= psi * r * h
+    return volume + psi * h * h * (3.0 * r - h) / 6.0
+
+
+@njit(cache=True, parallel=True)
+def row_sums(values):
+    """(f,): sum of the three values of each row."""
+    sums = np.empty(values.shape[0])
+    for f in prange(values.shape[0]):
+        sums[f] = values[f, 0] + values[f, 1] + values[f, 2]
+    return sums
 
 
 @njit(cache=True, parallel=True)

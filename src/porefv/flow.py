@@ -133,8 +133,10 @@ class PoreFlow:
             # A throat between Laguerre vertices closer than rounding is not longer than that.
             shortest = np.finfo(float).eps * float(self.mesh.packing.radii.min())
             lengths = np.maximum(throats.lengths, shortest)
-            passes = (conductivity > 0.0) & ~throats.closed
-            return np.where(passes, conductivity, 0.0) / (self.fluid.viscosity * lengths)
+            lengths *= self.fluid.viscosity
+            conductances = np.divide(conductivity, lengths, out=lengths)
+            conductances[(conductivity <= 0.0) | throats.closed] = 0.0
+            return conductances
 
     @cached_property
     def solution(self) -> PressureSolution:

@@ -115,7 +115,11 @@ class PoreMesh:
 
     @cached_property
     def _facets(self) -> tuple[np.ndarray, np.ndarray]:
-        return enumerate_facets(self.cells, self.neighbours, self.n_spheres)
+        # Every cell has four facets, each shared by two, but for the eight at the corners of the box.
+        count = (4 * self.n_cells - 8) // 2
+        facet_cells, vertices = np.empty((count, 2), np.int32), np.empty((count, 3), np.int32)
+        enumerate_facets(self.cells, self.neighbours, self.n_spheres, facet_cells, vertices)
+        return facet_cells, vertices
 
     @property
     def facet_cells(self) -> np.ndarray:

@@ -39,9 +39,24 @@ class Network:
     diagonal: np.ndarray
 
     @classmethod
-    def from_links(cls, pairs: np.ndarray, weights: np.ndarray, leaks: np.ndarray) -> Network:
-        """From links (t, 2) between nodes, their weights (t,) and the leaks (n,); parallel links stay apart."""
-        return cls(*_assemble(pairs, weights, leaks))
+    def from_links(
+        cls, pairs: np.ndarray, weights: np.ndarray, leaks: np.ndarray, number: np.ndarray | None = None
+    ) -> Network:
+        """From links (t, 2), their weights (t,) and the leaks (n,) of the nodes; parallel links stay apart.
+
+        Links join nodes, or things whose node is `number`; those with a negative number at one end are left out, as
+        are those without weight.
+        """
+        if number is None:
+            number = np.arange(len(leaks), dtype=np.int32)
+        starts = np.zeros(len(leaks) + 1, np.int64)
+        _count(pairs, weights, number, starts)
+        np.cumsum(starts, out=starts)
+        columns = np.empty(starts[-1], np.int32)
+        links = np.empty(starts[-1])
+        diagonal = leaks.copy()
+        _fill(pairs, weights, number, starts[:-1].copy(), columns, links, diagonal)
+        return cls(starts, columns, links, leaks, diagonal)
 
     def __len__(self) -> int:
         return len(self.leaks)
@@ -63,29 +78,32 @@ class Network:
 
 
 @njit(cache=True)
-def _assemble(pairs, weights, leaks):
-    n = leaks.shape[0]
-    starts = np.zeros(n + 1, np.int64)
+def _count(pairs, weights, number, starts):
+    """Add the number of node i's links to starts[i + 1]."""
     for t in range(pairs.shape[0]):
-        if weights[t] > 0.0:
-            starts[pairs[t, 0] + 1] += 1
-            starts[pairs[t, 1] + 1] += 1
-    for i in range(n):
-        starts[i + 1] += starts[i]
-    columns = np.empty(starts[n], np.int32)
-    links = np.empty(starts[n])
-    diagonal = leaks.copy()
-    place = starts[:-1].copy()
+        a = number[pairs[t, 0]]
+        b = number[pairs[t, 1]]
+        if a >= 0 and b >= 0 and weights[t] > 0.0:
+            starts[a + 1] += 1
+            starts[b + 1] += 1
+
+
+@njit(cache=True)
+def _fill(pairs, weights, number, place, columns, links, diagonal):
+    """Store every link in both its rows, from `place` on, and add it to the diagonal."""
     for t in range(pairs.shape[0]):
-        if weights[t] <= 0.0:
+        a = number[pairs[t, 0]]
+        b = number[pairs[t, 1]]
+        if a < 0 or b < 0 or weights[t] <= 0.0:
             continue
-        for end in range(2):
-            i = pairs[t, end]
-            columns[place[i]] = pairs[t, 1 - end]
-            links[place[i]] = weights[t]
-            diagonal[i] += weights[t]
-            place[i] += 1
-    return starts, columns, links, leaks, diagonal
+        columns[place[a]] = b
+        columns[place[b]] = a
+        links[place[a]] = weights[t]
+        links[place[b]] = weights[t]
+        diagonal[a] += weights[t]
+        diagonal[b] += weights[t]
+        place[a] += 1
+        place[b] += 1
 
 
 @njit(cache=True, parallel=True)

@@ -112,11 +112,12 @@ def _reached(pairs, weights, sources):
 
 def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
     """Pressures with those of the free pores solved for, all others held."""
-    number = np.where(free, np.cumsum(free) - 1, -1).astype(np.int32)
+    number = np.cumsum(free, dtype=np.int32) - np.int32(1)
+    number[~free] = -1
     rhs = sources[free]
     leaks = np.zeros(len(rhs))
-    inside = _leak(pairs, conductances, pressure, number, leaks, rhs)
-    network = Network.from_links(number[pairs[inside]], conductances[inside], leaks)
+    _leak(pairs, conductances, pressure, number, leaks, rhs)
+    network = Network.from_links(pairs, conductances, leaks, number)
     x, report = solve(network, rhs, solver, tolerance)
     solved = pressure.copy()
     solved[free] = x
@@ -125,19 +126,15 @@ def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance)
 
 @njit(cache=True)
 def _leak(pairs, conductances, pressure, number, leaks, rhs):
-    """Add links to held pores to `leaks` and `rhs`; returns which links lie between free pores, (t,) bool."""
-    inside = np.zeros(pairs.shape[0], np.bool_)
+    """Add links from free to held pores to `leaks` and `rhs`."""
     for t in range(pairs.shape[0]):
         i = pairs[t, 0]
         j = pairs[t, 1]
         a = number[i]
         b = number[j]
-        if a >= 0 and b >= 0:
-            inside[t] = conductances[t] > 0.0
-        elif a >= 0:
+        if a >= 0 and b < 0:
             leaks[a] += conductances[t]
             rhs[a] += conductances[t] * pressure[j]
-        elif b >= 0:
+        elif b >= 0 and a < 0:
             leaks[b] += conductances[t]
             rhs[b] += conductances[t] * pressure[i]
-    return inside

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.facets import facet_sections, facet_volumes, inscribed_circles
+from porefv.facets import facet_sections, facet_volumes, inscribed_circles, row_sums, tied_facets
 
 if TYPE_CHECKING:
     from porefv.mesh import PoreMesh
@@ -68,9 +68,14 @@ class Throats:
         return self._sections[1]
 
     @property
+    def facet_fluid_areas(self) -> np.ndarray:
+        """(f,): A^f = A - Σ A^k of each facet [m²]."""
+        return self._sections[2]
+
+    @property
     def facet_areas(self) -> np.ndarray:
         """(f,): area A of each facet, solid and fluid [m²]."""
-        return self._sections[2]
+        return self.facet_fluid_areas + row_sums(self.facet_sectors)
 
     @property
     def facet_sectors(self) -> np.ndarray:
@@ -81,12 +86,6 @@ class Throats:
     def facet_covered(self) -> np.ndarray:
         """(f,) bool: facets covered by their spheres, all of which hold the facet's radical centre."""
         return self._sections[4]
-
-    @cached_property
-    def facet_fluid_areas(self) -> np.ndarray:
-        """(f,): A^f = A - Σ A^k of each facet [m²]."""
-        a, b, c = self.facet_sectors.T
-        return self.facet_areas - (a + b + c)
 
     @property
     def facet_volumes(self) -> np.ndarray:
@@ -112,13 +111,9 @@ class Throats:
     def _further(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The further facets of throats that a tie has cut in several: their ids, first facets and senses."""
         mesh = self.mesh
-        tied = np.bincount(mesh.cell_node) > 1
-        if not tied.any():
-            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
-        nodes = mesh.cell_node[mesh.facet_cells]
         # Only between two Laguerre vertices that are both tied can there be more facets than one.
-        several = np.flatnonzero(tied[nodes].all(axis=1) & np.not_equal(*mesh.cell_pore[mesh.facet_cells].T))
-        nodes = nodes[several].astype(np.int64)
+        several = tied_facets(mesh.facet_cells, mesh.cell_node, mesh.cell_pore)
+        nodes = mesh.cell_node[mesh.facet_cells[several]].astype(np.int64)
         keys = nodes.min(axis=1) * mesh.n_cells + nodes.max(axis=1)
         _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
         first = first[inverse]
@@ -137,7 +132,10 @@ class Throats:
 
     def _total(self, values: np.ndarray) -> np.ndarray:
         """(t,): sum of facet values (f,) over each throat."""
-        return self.total_by_facet(values)[self.first_facets]
+        totals = values[self.first_facets]
+        further, first, _ = self._further
+        np.add.at(totals, np.searchsorted(self.first_facets, first), values[further])
+        return totals
 
     def total_by_facet(self, values: np.ndarray) -> np.ndarray:
         """(f, ...): sum of facet values over each facet's throat."""
@@ -201,8 +199,7 @@ class Throats:
 
     def wetted_surfaces(self, slip: np.ndarray) -> np.ndarray:
         """(t,): Σγ^k of each throat over its spheres and no-slip walls [m²]."""
-        a, b, c = self.facet_wetted_surfaces(slip).T
-        return self._total(a + b + c)
+        return self._total(row_sums(self.facet_wetted_surfaces(slip)))
 
     def inscribed_radii(self, slip: np.ndarray) -> np.ndarray:
         """(t,): radius of the circle in the throat's plane tangent to its spheres and no-slip walls [m].
