@@ -120,9 +120,9 @@ def test_sources_and_imposed_pressures_superpose(solver):
     sources = np.zeros(60)
     sources[[5, 17]] = 1e-3, -2e-3
     none = np.where(np.isnan(fixed), NAN, 0.0)
-    both = solve_network(pairs, k, fixed, sources=sources, solver=solver).pressure
-    one = solve_network(pairs, k, fixed, solver=solver).pressure
-    other = solve_network(pairs, k, none, sources=sources, solver=solver).pressure
+    both = solve_network(pairs, k, fixed, sources=sources, solver=solver, tolerance=1e-12).pressure
+    one = solve_network(pairs, k, fixed, solver=solver, tolerance=1e-12).pressure
+    other = solve_network(pairs, k, none, sources=sources, solver=solver, tolerance=1e-12).pressure
     assert_allclose(both, one + other, rtol=0, atol=1e-10)
     i, j = pairs.T
     q = k * (both[i] - both[j])

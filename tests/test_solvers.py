@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.errors import ComputationError, InputError
 from porefv.network import Network
-from porefv.solvers import DIRECT_LIMIT, SOLVERS, solve
+from porefv.solvers import DIRECT_LIMIT, SOLVERS, Solver, solve
 
 METHODS = ["direct", "cg"]
 
@@ -102,8 +102,8 @@ def test_pressures_stay_within_those_held(solver, decades):
 def test_direct_and_iterative_solutions_agree(decades):
     for seed in range(3):
         network, rhs = grid_network(12, decades, seed)
-        direct, _ = solve(network, rhs, "direct")
-        iterative, _ = solve(network, rhs, "cg")
+        direct, _ = solve(network, rhs, "direct", 1e-12)
+        iterative, _ = solve(network, rhs, "cg", 1e-12)
         # Loss of 1e-12 of the flow across a resistance of 10^decades times the least one.
         assert_allclose(iterative, direct, atol=1e-12 * 10.0**decades, rtol=0)
 
@@ -288,3 +288,35 @@ def test_a_looser_tolerance_is_kept_too(solver):
     assert report.imbalance <= 1e-4 and report.tolerance == 1e-4
     if solver == "cg":
         assert report.iterations < solve(network, rhs, solver)[1].iterations
+
+
+# ---- many right-hand sides ----------
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_factor_serves_many_right_hand_sides_and_guesses(method):
+    network, rhs = grid_network(10, 3)
+    ready = Solver(network, method, many=True)
+    once, first = ready.solve(rhs, 1e-12)
+    assert_allclose(once, solve(network, rhs, method, 1e-12)[0], rtol=0, atol=1e-12)
+    twice, _ = ready.solve(2.0 * rhs, 1e-12)
+    # Linear: what is lost of the flow, 1e-12, across a resistance of up to 10³.
+    assert_allclose(twice, 2.0 * once, rtol=0, atol=1e-9)
+    again, report = ready.solve(rhs, 1e-10, guess=once)
+    assert_allclose(again, once, rtol=0, atol=1e-9)
+    assert report.iterations <= 1  # nothing is left to do
+    assert first.name == method
+
+
+def test_many_right_hand_sides_are_worth_a_factor_sooner():
+    network, _ = grid_network(15, 0)  # 3375 nodes
+    assert Solver(network).name == "cg"
+    assert Solver(network, many=True).name == "direct"
+
+
+@pytest.mark.parametrize("decades", [0, 4, 8, 12])
+def test_iterations_hardly_depend_on_contrast(decades):
+    network, rhs = grid_network(30, decades, fraction_leaking=0.001)
+    _, uniform = solve(*grid_network(30, 0, fraction_leaking=0.001), "cg", 1e-8)
+    _, report = solve(network, rhs, "cg", 1e-8)
+    assert report.iterations <= 1.5 * uniform.iterations

@@ -27,7 +27,7 @@ _GROUND = -1
 _HALF_LINK = np.dtype([("weight", np.float64), ("other", np.int32), ("following", np.int32)])
 # Nodes from which two parts pay, and the size beyond which there are more of them.
 _CUT_FROM = 20_000
-_PART = 100_000
+_PART = 400_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,8 @@ class ApproximateCholesky:
         Column k of -L below its unit diagonal.
     pivots : (n,) array
         D.
+    row_starts, row_columns, row_factors
+        The rows of -L in which the separator hangs on the parts, so that every row can be summed by itself.
     """
 
     order: np.ndarray
@@ -54,6 +56,9 @@ class ApproximateCholesky:
     rows: np.ndarray
     factors: np.ndarray
     pivots: np.ndarray
+    row_starts: np.ndarray
+    row_columns: np.ndarray
+    row_factors: np.ndarray
 
     @classmethod
     def of(cls, network: Network) -> ApproximateCholesky:
@@ -86,14 +91,13 @@ class ApproximateCholesky:
         position = np.empty(n, np.int32)
         position[order] = np.arange(n, dtype=np.int32)
         fills = np.cumsum([0] + [len(piece[2]) for piece in pieces])
-        return cls(
-            order,
-            np.cumsum([0] + [len(piece[0]) for piece in pieces[:-1]]),
-            np.concatenate([piece[1][:-1] + fill for piece, fill in zip(pieces, fills, strict=False)] + [fills[-1:]]),
-            np.concatenate([position[piece[2]] for piece in pieces]),
-            np.concatenate([piece[3] for piece in pieces]),
-            pivots,
+        parts = np.cumsum([0] + [len(piece[0]) for piece in pieces[:-1]])
+        starts = np.concatenate(
+            [piece[1][:-1] + fill for piece, fill in zip(pieces, fills, strict=False)] + [fills[-1:]]
         )
+        rows = np.concatenate([position[piece[2]] for piece in pieces])
+        factors = np.concatenate([piece[3] for piece in pieces])
+        return cls(order, parts, starts, rows, factors, pivots, *_rows_of(parts[-1], starts, rows, factors))
 
     @staticmethod
     def _separator_piece(network, separator, pieces):
@@ -113,7 +117,10 @@ class ApproximateCholesky:
 
     def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
         """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z. `y`, (n,), is room to work in."""
-        return substitute(self.order, self.parts, self.starts, self.rows, self.factors, self.pivots, r, z, y)
+        return substitute(
+            self.order, self.parts, self.starts, self.rows, self.factors, self.pivots,
+            self.row_starts, self.row_columns, self.row_factors, r, z, y,
+        )  # fmt: skip
 
 
 @njit(cache=True)
@@ -370,20 +377,45 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
     )  # fmt: skip
 
 
+@njit(cache=True)
+def _rows_of(n_inner, starts, rows, factors):
+    """Entries of the first n_inner columns in rows from n_inner on, row by row: starts, columns, factors."""
+    n = starts.shape[0] - 1
+    row_starts = np.zeros(n - n_inner + 1, np.int64)
+    for e in range(starts[n_inner]):
+        if rows[e] >= n_inner:
+            row_starts[rows[e] - n_inner + 1] += 1
+    for i in range(n - n_inner):
+        row_starts[i + 1] += row_starts[i]
+    columns = np.empty(row_starts[-1], np.int32)
+    row_factors = np.empty(row_starts[-1], np.float32)
+    place = row_starts[:-1].copy()
+    for k in range(n_inner):
+        for e in range(starts[k], starts[k + 1]):
+            i = rows[e] - n_inner
+            if i >= 0:
+                columns[place[i]] = k
+                row_factors[place[i]] = factors[e]
+                place[i] += 1
+    return row_starts, columns, row_factors
+
+
 @njit(cache=True, parallel=True)
-def substitute(order, parts, starts, rows, factors, pivots, r, z, y):
+def substitute(
+    order, parts, starts, rows, factors, pivots, row_starts, row_columns, row_factors, r, z, y
+):  # fmt: skip
     """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z."""
     n = order.shape[0]
     n_parts = parts.shape[0] - 1
     n_inner = parts[n_parts]
-    shares = np.zeros((n_parts, n - n_inner))
     products = np.zeros(n_parts + 1)
     for part in prange(n_parts):
-        _forward(parts[part], parts[part + 1], n_inner, order, starts, rows, factors, r, y, shares[part])
-    for k in range(n_inner, n):
-        y[k] = r[order[k]]
-        for part in range(n_parts):
-            y[k] += shares[part, k - n_inner]
+        _forward(parts[part], parts[part + 1], n_inner, order, starts, rows, factors, r, y)
+    for i in prange(n - n_inner):
+        s = r[order[n_inner + i]]
+        for e in range(row_starts[i], row_starts[i + 1]):
+            s += row_factors[e] * y[row_columns[e]]
+        y[n_inner + i] = s
     for k in range(n_inner, n):
         v = y[k]
         for e in range(starts[k], starts[k + 1]):
@@ -395,8 +427,8 @@ def substitute(order, parts, starts, rows, factors, pivots, r, z, y):
 
 
 @njit(cache=True)
-def _forward(first, last, n_inner, order, starts, rows, factors, r, y, share):
-    """y = L⁻¹ r for one part, and its share of the separator's right-hand side."""
+def _forward(first, last, n_inner, order, starts, rows, factors, r, y):
+    """y = L⁻¹ r within one part."""
     for k in range(first, last):
         y[k] = r[order[k]]
     for k in range(first, last):
@@ -404,8 +436,6 @@ def _forward(first, last, n_inner, order, starts, rows, factors, r, y, share):
         for e in range(starts[k], starts[k + 1]):
             if rows[e] < n_inner:
                 y[rows[e]] += factors[e] * v
-            else:
-                share[rows[e] - n_inner] += factors[e] * v
 
 
 @njit(cache=True, error_model="numpy")

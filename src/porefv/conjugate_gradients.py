@@ -32,7 +32,11 @@ def _measures(network, rhs, x):
 
 
 def conjugate_gradients(
-    network: Network, rhs: np.ndarray, preconditioner: ApproximateCholesky, tolerance: float
+    network: Network,
+    rhs: np.ndarray,
+    preconditioner: ApproximateCholesky,
+    tolerance: float,
+    guess: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
     """Iterate until Σ|b - A x| is below `tolerance` times the flow, or rounding allows no better.
 
@@ -41,7 +45,7 @@ def conjugate_gradients(
     x (n,), number of iterations
     """
     a = network
-    x = np.zeros(len(a))
+    x = np.zeros(len(a)) if guess is None else guess.copy()
     z, ap, room = np.empty((3, len(a)))
     iterations = 0
     before = np.inf

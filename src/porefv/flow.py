@@ -18,7 +18,7 @@ from porefv.forces import Forces, fluid_forces
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
 from porefv.pressure import PressureSolution, solve_network
-from porefv.solvers import SolverReport
+from porefv.solvers import TOLERANCE, SolverReport
 from porefv.velocity import pore_velocities
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class PoreFlow:
     gravity : (3,) sequence of float
         Acceleration of gravity, for buoyancy [m/s²].
     solver, tolerance
-        See `porefv.solvers.solve`.
+        See `porefv.solvers.Solver`.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class PoreFlow:
         *,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
         solver: str = "auto",
-        tolerance: float = 1e-12,
+        tolerance: float = TOLERANCE,
     ):
         self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
         self.walls = walls

@@ -9,7 +9,7 @@ from numba import njit
 
 from porefv.errors import ComputationError
 from porefv.network import Network
-from porefv.solvers import SolverReport, solve
+from porefv.solvers import TOLERANCE, SolverReport, solve
 from porefv.union_find import join
 
 
@@ -39,7 +39,7 @@ def solve_network(
     links: np.ndarray | None = None,
     sources: np.ndarray | None = None,
     solver: str = "auto",
-    tolerance: float = 1e-12,
+    tolerance: float = TOLERANCE,
 ) -> PressureSolution:
     """Solve for the pressures of the pores that are not fixed.
 
@@ -58,7 +58,7 @@ def solve_network(
     sources : (n_pores,) array, optional
         Volume injected into each free pore per unit time [m³/s].
     solver, tolerance
-        See `porefv.solvers.solve`.
+        See `porefv.solvers.Solver`.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def solve_network(
     if free.all():
         raise ComputationError("no pore has an imposed pressure: pressures are defined only up to a constant")
     sources = np.zeros(n) if sources is None else sources
-    isolated = ~_reached(pairs, conductances, ~free)
+    isolated = ~reached(pairs, conductances, ~free)
     if np.any(sources[isolated] != 0.0):
         pore = int(np.flatnonzero(isolated & (sources != 0.0))[0])
         raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
@@ -78,7 +78,7 @@ def solve_network(
     pressure = np.where(free, 0.0, fixed)
     pressure, report = _solve_free(pairs, conductances, pressure, free & ~isolated, sources, solver, tolerance)
     if isolated.any():
-        cut_off = ~_reached(pairs, np.ones(len(pairs)), ~free)
+        cut_off = ~reached(pairs, np.ones(len(pairs)), ~free)
         if cut_off.any():
             raise ComputationError(
                 f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
@@ -93,7 +93,7 @@ def solve_network(
 
 
 @njit(cache=True)
-def _reached(pairs, weights, sources):
+def reached(pairs, weights, sources):
     """(n,) bool: nodes that links of positive weight join to a source."""
     n = sources.shape[0]
     parent = np.arange(n)
@@ -112,16 +112,31 @@ def _reached(pairs, weights, sources):
 
 def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
     """Pressures with those of the free pores solved for, all others held."""
+    network, rhs = free_network(pairs, conductances, pressure, free, sources)
+    x, report = solve(network, rhs, solver, tolerance)
+    solved = pressure.copy()
+    solved[free] = x
+    return solved, report
+
+
+def free_network(
+    pairs: np.ndarray, conductances: np.ndarray, pressure: np.ndarray, free: np.ndarray, sources: np.ndarray
+) -> tuple[Network, np.ndarray]:
+    """The network of the free pores, all others held at their pressure, and its right-hand side.
+
+    Parameters
+    ----------
+    pairs : (t, 2) int array
+    conductances : (t,) array
+    pressure, sources : (n_pores,) arrays
+    free : (n_pores,) bool array
+    """
     number = np.cumsum(free, dtype=np.int32) - np.int32(1)
     number[~free] = -1
     rhs = sources[free]
     leaks = np.zeros(len(rhs))
     _leak(pairs, conductances, pressure, number, leaks, rhs)
-    network = Network.from_links(pairs, conductances, leaks, number)
-    x, report = solve(network, rhs, solver, tolerance)
-    solved = pressure.copy()
-    solved[free] = x
-    return solved, report
+    return Network.from_links(pairs, conductances, leaks, number), rhs
 
 
 @njit(cache=True)

@@ -1,9 +1,10 @@
-"""Solvers of the pressure equation behind one interface."""
+"""Solvers of the pressure equation behind one interface, chosen by the number of unknowns and of right-hand sides."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,8 +15,13 @@ from porefv.network import Network
 
 SOLVERS = ("auto", "direct", "cg")
 
-# Up to this many unknowns a factorisation costs no more than the iterations it saves.
+# What all pores together may fail to conserve, relative to the flow.
+TOLERANCE = 1e-10
+
+# Up to so many unknowns a factorisation costs no more than the iterations it saves, over one solution and over many
+# (benchmarks/solvers.py).
 DIRECT_LIMIT = 2_000
+DIRECT_LIMIT_MANY = 20_000
 
 
 @dataclass(frozen=True)
@@ -45,61 +51,97 @@ class SolverReport:
     seconds: float
 
 
-def solve(
-    network: Network, rhs: np.ndarray, solver: str = "auto", tolerance: float = 1e-12
-) -> tuple[np.ndarray, SolverReport]:
-    """Solve A x = b on a network.
+class Solver:
+    """A network made ready to be solved, for one right-hand side or for many.
 
     Parameters
     ----------
     network : Network
         Every part of it must be joined to a leak.
-    rhs : (n,) array
-        Flux into each node: held pressures times their links, and sources [m³/s].
     solver : {'auto', 'direct', 'cg'}
         `direct`: sparse factorisation (SuperLU, minimum degree). `cg`: conjugate gradients with an approximate
-        Cholesky factor. `auto`: `direct` up to `DIRECT_LIMIT` unknowns, else `cg`.
-    tolerance : float
-        Bound on the imbalance (see `SolverReport`). Where rounding does not allow it, its floor counts.
+        Cholesky factor. `auto`: `direct` up to `DIRECT_LIMIT` unknowns, or `DIRECT_LIMIT_MANY` with `many`; else `cg`.
+    many : bool
+        Whether the network will be solved for many right-hand sides.
+
+    Attributes
+    ----------
+    name : str
+        The solver used, `auto` resolved.
 
     Raises
     ------
     InputError
-        For an unknown solver or a tolerance that is not in (0, 1).
-    ComputationError
-        If the tolerance is not reached.
+        For an unknown solver.
     """
-    if solver not in SOLVERS:
-        raise InputError(f"unknown solver {solver!r}; known: {', '.join(SOLVERS)}")
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
-    begin = time.perf_counter()
-    n = len(network)
-    if solver == "auto":
-        solver = "direct" if n <= DIRECT_LIMIT else "cg"
-    if not rhs.any():
-        return np.zeros(n), SolverReport(solver, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin)
-    if solver == "direct":
-        x, iterations = _direct(network, rhs, tolerance)
-    else:
-        x, iterations = conjugate_gradients(network, rhs, ApproximateCholesky.of(network), tolerance)
-    lost, flow, floor = imbalance(network, rhs, x)
-    if floor > flow:
-        if _driven(network, rhs):
+
+    def __init__(self, network: Network, solver: str = "auto", *, many: bool = False):
+        if solver not in SOLVERS:
+            raise InputError(f"unknown solver {solver!r}; known: {', '.join(SOLVERS)}")
+        if solver == "auto":
+            solver = "direct" if len(network) <= (DIRECT_LIMIT_MANY if many else DIRECT_LIMIT) else "cg"
+        self.network = network
+        self.name = solver
+
+    @cached_property
+    def _factor(self) -> DirectFactor | ApproximateCholesky:
+        return DirectFactor(self.network) if self.name == "direct" else ApproximateCholesky.of(self.network)
+
+    def solve(
+        self, rhs: np.ndarray, tolerance: float = TOLERANCE, guess: np.ndarray | None = None
+    ) -> tuple[np.ndarray, SolverReport]:
+        """Solve A x = b. The first call makes the factor.
+
+        Parameters
+        ----------
+        rhs : (n,) array
+            Flux into each node: held pressures times their links, and sources [m³/s].
+        tolerance : float
+            Bound on the imbalance (see `SolverReport`). Where rounding does not allow it, its floor counts.
+        guess : (n,) array, optional
+            Where iterations start, zero by default.
+
+        Raises
+        ------
+        InputError
+            For a tolerance that is not in (0, 1).
+        ComputationError
+            If the network is singular, or the tolerance not reached.
+        """
+        if not 0.0 < tolerance < 1.0:
+            raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
+        begin = time.perf_counter()
+        n = len(self.network)
+        if not rhs.any():
+            return np.zeros(n), SolverReport(self.name, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin)
+        if isinstance(self._factor, DirectFactor):
+            x, iterations = self._factor.solve(rhs, tolerance)
+        else:
+            x, iterations = conjugate_gradients(self.network, rhs, self._factor, tolerance, guess)
+        lost, flow, floor = imbalance(self.network, rhs, x)
+        if floor > flow:
+            if _driven(self.network, rhs):
+                raise ComputationError(
+                    "conductances differ by too many decades for double precision: rounding alone would lose as much "
+                    "as flows; leave out spheres that are much smaller than the rest"
+                )
+            flow, lost, floor = 1.0, 0.0, 0.0  # equal pressures: nothing flows but what rounding makes
+        reached = lost / flow
+        floor = floor / flow
+        report = SolverReport(self.name, n, iterations, tolerance, reached, floor, time.perf_counter() - begin)
+        if not reached <= max(tolerance, floor):
             raise ComputationError(
-                "conductances differ by too many decades for double precision: rounding alone would lose as much as "
-                "flows; leave out spheres that are much smaller than the rest"
+                f"the {self.name} solver stopped at a flux imbalance of {reached:.1e} after {iterations} iterations "
+                f"(asked: {tolerance:.1e}); try solver = 'direct' or a larger tolerance"
             )
-        flow, lost, floor = 1.0, 0.0, 0.0  # equal pressures: nothing flows but what rounding makes
-    reached = lost / flow
-    floor = floor / flow
-    report = SolverReport(solver, n, iterations, tolerance, reached, floor, time.perf_counter() - begin)
-    if not reached <= max(tolerance, floor):
-        raise ComputationError(
-            f"the {solver} solver stopped at a flux imbalance of {reached:.1e} after {iterations} iterations "
-            f"(asked: {tolerance:.1e}); try solver = 'direct' or a larger tolerance"
-        )
-    return x, report
+        return x, report
+
+
+def solve(
+    network: Network, rhs: np.ndarray, solver: str = "auto", tolerance: float = TOLERANCE
+) -> tuple[np.ndarray, SolverReport]:
+    """Solve A x = b on a network, once (see `Solver`)."""
+    return Solver(network, solver).solve(rhs, tolerance)
 
 
 def _driven(network: Network, rhs: np.ndarray) -> bool:
@@ -115,23 +157,35 @@ def _driven(network: Network, rhs: np.ndarray) -> bool:
     return bool(np.any(highest - lowest > 1e-9 * np.abs(values).max()) or np.any(rhs[network.leaks == 0.0] != 0.0))
 
 
-def _direct(network: Network, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
-    import scipy.sparse as sparse
-    from scipy.sparse.linalg import splu
+class DirectFactor:
+    """Sparse factor of a network (SuperLU, minimum degree)."""
 
-    # Scaled to a unit diagonal: units and contrast then do not meet the factorisation's thresholds.
-    scale = sparse.diags_array(1.0 / np.sqrt(network.diagonal))
-    matrix = (scale @ network.to_matrix() @ scale).tocsc()
-    try:
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:
-        raise ComputationError("the network is singular: a part of it is not joined to any imposed pressure") from None
-    x = scale @ factor.solve(scale @ rhs)
-    refinements = 0
-    while refinements < 3:
-        refinements += 1
-        lost, flow, floor = imbalance(network, rhs, x)
-        if lost <= max(tolerance * flow, floor):
-            break
-        x += scale @ factor.solve(scale @ network.residual(rhs, x))
-    return x, refinements
+    def __init__(self, network: Network):
+        import scipy.sparse as sparse
+        from scipy.sparse.linalg import splu
+
+        self.network = network
+        # Scaled to a unit diagonal: units and contrast then do not meet the factorisation's thresholds.
+        self.scale = 1.0 / np.sqrt(network.diagonal)
+        scale = sparse.diags_array(self.scale)
+        matrix = (scale @ network.to_matrix() @ scale).tocsc()
+        try:
+            self.factor = splu(
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+        except RuntimeError:
+            raise ComputationError(
+                "the network is singular: a part of it is not joined to any imposed pressure"
+            ) from None
+
+    def solve(self, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
+        """x (n,), refined until its imbalance is below the tolerance, and the number of refinements."""
+        x = self.scale * self.factor.solve(self.scale * rhs)
+        refinements = 0
+        while refinements < 3:
+            refinements += 1
+            lost, flow, floor = imbalance(self.network, rhs, x)
+            if lost <= max(tolerance * flow, floor):
+                break
+            x += self.scale * self.factor.solve(self.scale * self.network.residual(rhs, x))
+        return x, refinements
