@@ -6,15 +6,18 @@ Sums run over blocks of fixed size, so that results do not depend on the number 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange
 
 from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.network import Network
+from porefv.threads import threads
 
 _BLOCK = 16384
 _MAX_ITERATIONS = 500
 # Iterations between two looks at what the tolerance is measured against.
 _LOOK_EVERY = 4
+# Up to so many unknowns threads gain less than waiting for each other costs; on a busy machine it costs most of all.
+_ALONE = 30_000
 
 
 def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -44,7 +47,11 @@ def conjugate_gradients(
     -------
     x (n,), number of iterations
     """
-    a = network
+    with threads(1 if len(network) <= _ALONE else get_num_threads()):
+        return _iterate(network, rhs, preconditioner, tolerance, guess)
+
+
+def _iterate(a, rhs, preconditioner, tolerance, guess):
     x = np.zeros(len(a)) if guess is None else guess.copy()
     z, ap, room = np.empty((3, len(a)))
     iterations = 0

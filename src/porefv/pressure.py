@@ -100,14 +100,14 @@ def reached(pairs, weights, sources):
     for t in range(pairs.shape[0]):
         if weights[t] > 0.0:
             join(parent, pairs[t, 0], pairs[t, 1])
-    reached = np.zeros(n, np.bool_)
+    found = np.zeros(n, np.bool_)
     for i in range(n):  # a root comes before all that hang on it
         parent[i] = parent[parent[i]]
         if sources[i]:
-            reached[parent[i]] = True
+            found[parent[i]] = True
     for i in range(n):
-        reached[i] = reached[parent[i]]
-    return reached
+        found[i] = found[parent[i]]
+    return found
 
 
 def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
