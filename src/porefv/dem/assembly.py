@@ -1,0 +1,597 @@
+"""DEM: grains that move under contact forces, gravity and whatever is applied to them (C14 §2.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import get_num_threads, njit
+
+from porefv.dem.contacts import grain_contacts, wall_contacts
+from porefv.dem.motion import CROWDED, RUNAWAY, advance
+from porefv.errors import ComputationError, InputError
+from porefv.neighbours import neighbour_pairs
+from porefv.packing import WALLS, Box, Packing
+from porefv.tessellation.ordering import morton_codes
+from porefv.threads import threads
+
+# The step, as a part of the critical one √(m/k): motion was stable to 0.56 of it in the densest packing with the
+# highest friction we tried (benchmarks/dem.py); half of that is taken.
+SAFETY = 0.3
+# A grain that covers more than this part of the smallest radius in one step has passed others unseen.
+_RUNAWAY = 0.1
+# Part of the way to balance, by the stiffness of its contacts, that a pressing wall moves in one step.
+_GAIN = 0.2
+# Part of the smallest radius that grains may come closer before pairs are listed anew.
+_SKIN = 0.2
+
+
+@dataclass(frozen=True)
+class Material:
+    """What grains are made of.
+
+    Parameters
+    ----------
+    young : float
+        E of the contact stiffness k_n = 2 E r_i r_j / (r_i + r_j) [Pa].
+    stiffness_ratio : float
+        k_s / k_n.
+    friction_angle : float
+        φ between grains [degrees].
+    density : float
+        Of the solid [kg/m³].
+    """
+
+    young: float = 15.0e6
+    stiffness_ratio: float = 0.5
+    friction_angle: float = 30.0
+    density: float = 2600.0
+
+    def __post_init__(self) -> None:
+        _check(self.young, "young", "a positive modulus in Pa", lambda x: x > 0.0)
+        _check(self.stiffness_ratio, "stiffness_ratio", "zero or a positive number", lambda x: x >= 0.0)
+        _check(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
+        _check(self.density, "density", "a positive density in kg/m³", lambda x: x > 0.0)
+
+    @property
+    def friction(self) -> float:
+        """tan φ."""
+        return math.tan(math.radians(self.friction_angle))
+
+
+@dataclass(frozen=True)
+class Plate:
+    """What a wall does: stand (the default), move, or press.
+
+    Parameters
+    ----------
+    velocity : (3,) sequence of float
+        Of the wall; its component along the wall shears what touches it [m/s].
+    stress : float, optional
+        Normal stress the wall is to press with, positive in compression: it then moves as it must, by
+        servo-control, and its normal velocity is not given [Pa].
+    top_speed : float, optional
+        Largest speed of a pressing wall [m/s].
+    friction_angle : float
+        Between wall and grains [degrees].
+    """
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stress: float | None = None
+    top_speed: float | None = None
+    friction_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.velocity) != 3 or not all(math.isfinite(v) for v in self.velocity):
+            raise InputError(f"the velocity of a wall must be three finite numbers in m/s, not {self.velocity!r}")
+        _check(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
+        if self.stress is not None:
+            _check(self.stress, "stress", "a stress in Pa, zero or more (compression)", lambda x: x >= 0.0)
+            if self.top_speed is None:
+                raise InputError("a wall with a stress needs a top_speed in m/s")
+            _check(self.top_speed, "top_speed", "a positive speed in m/s", lambda x: x > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts at this moment: forces on grains from others and from walls.
+
+    Attributes
+    ----------
+    grains : (c, 2) int array
+        Grains i, j of each contact; j = n + w for wall w.
+    normals : (c, 3) array
+        Unit vector from i to j.
+    points : (c, 3) array
+        Middle of the overlap; on the wall, for walls [m].
+    forces : (c, 3) array
+        Force on i [N].
+    overlaps : (c,) array
+        u_n [m].
+    """
+
+    grains: np.ndarray
+    normals: np.ndarray
+    points: np.ndarray
+    forces: np.ndarray
+    overlaps: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.grains)
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies [J]: what there is, and what has come and gone since the start.
+
+    Kinetic energy is ½ m v(t - dt/2)·v(t + dt/2) and the like for spins: with it the total is conserved exactly by the
+    leapfrog on linear contacts that neither open nor close.
+    """
+
+    kinetic: float
+    elastic: float
+    potential: float
+    sliding: float
+    damping: float
+    walls: float
+    applied: float
+
+    @property
+    def stored(self) -> float:
+        """Kinetic, elastic and potential energy."""
+        return self.kinetic + self.elastic + self.potential
+
+    @property
+    def balance(self) -> float:
+        """Stored and dissipated energy less work done on the grains: constant, but for the error of the steps."""
+        return self.stored + self.sliding + self.damping - self.walls - self.applied
+
+
+class DEM:
+    """Spherical grains between six walls, moved by an explicit discrete element method.
+
+    Parameters
+    ----------
+    packing : Packing
+        Grains in a box; the box's walls are plates. Ids are positions in the packing.
+    material : Material
+    plates : mapping from wall names to Plate, optional
+        Walls that are not named stand still, without friction.
+    gravity : (3,) sequence of float
+        [m/s²]
+    damping : float
+        Local non-viscous damping (Cundall), for dry preparation only: part of each acceleration, in [0, 1).
+    step : float, optional
+        Time step [s]; `SAFETY` times the critical one by default.
+    threads : int, optional
+        Threads to share the work between; results depend on it by rounding. All of numba's by default, as far as
+        there are 1000 grains for each.
+
+    Attributes
+    ----------
+    applied : (n, 3) array
+        Force on each grain from outside, by id, kept until changed [N].
+    steps : int
+        Steps taken.
+
+    Raises
+    ------
+    InputError
+        For a packing without a box, grains outside of it or nested in others, a step above the critical one, or a
+        parameter out of range.
+
+    Notes
+    -----
+    Whatever offers `positions`, `velocities`, `radii`, `box`, `wall_velocities`, `apply` and `run` with these meanings
+    can take its place in a coupling.
+    """
+
+    def __init__(
+        self,
+        packing: Packing,
+        material: Material | None = None,
+        plates: Mapping[str, Plate] | None = None,
+        *,
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        damping: float = 0.0,
+        step: float | None = None,
+        threads: int | None = None,
+    ):
+        self.material = material if material is not None else Material()
+        self.gravity = np.array(gravity, float)
+        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
+            raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
+        _check(damping, "damping", "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
+        self.damping = float(damping)
+        _check_grains(packing)
+        assert packing.box is not None  # _check_grains has seen to it
+        n = len(packing)
+        most = get_num_threads() if threads is None else threads
+        if not (isinstance(most, int) and most >= 1):
+            raise InputError(f"threads must be a whole number, 1 or more, not {threads!r}")
+        self.threads = most if threads is not None else max(1, min(most, n // 1000))
+
+        # Inside, grains are numbered along a space-filling curve: near in space, near in memory.
+        self._order = np.argsort(morton_codes(np.asarray(packing.centres)), kind="stable")
+        self._rank = np.empty(n, np.int64)
+        self._rank[self._order] = np.arange(n)
+        self._state = np.zeros((n, 10))
+        self._state[:, :3] = packing.centres[self._order]
+        self._state[:, 3] = packing.radii[self._order]
+        self._applied = np.zeros((n, 3))
+        self.places = np.stack([packing.box.lower, packing.box.upper], axis=1).ravel()
+        self.wall_velocities = np.zeros((6, 3))
+        self._wall_forces = np.zeros((6, 3))
+        self._pairs = np.empty((0, 2), np.int32)
+        self._shear, self._touching = np.empty((0, 3)), np.empty(0, bool)
+        self._rims = np.empty((0, 2), np.int32)
+        self._rim_shear, self._rim_touching = np.empty((0, 3)), np.empty(0, bool)
+        self._work = np.zeros(3)
+        self._applied_work = 0.0
+        self._loads = np.zeros((self.threads, n, 6))
+        self._wall_loads = np.zeros((self.threads, 6, 4))
+        self.steps = 0
+        self.time = 0.0
+        self.set_plates(plates or {})
+        self._measure_grains()
+        critical = self.critical_step
+        if step is None:
+            step = SAFETY * critical
+        _check(step, "step", "a positive time in s", lambda x: x > 0.0)
+        if step >= critical:
+            raise InputError(
+                f"a step of {step:.4g} s is above the critical one, {critical:.4g} s (√(m/k) of the lightest grain and "
+                f"its stiffest contact); leave it out to have {SAFETY} of that"
+            )
+        self.step = float(step)
+        self._list_pairs()
+
+    # ---- set-up -------------------------------------------------------------------------------------------------
+
+    def set_plates(self, plates: Mapping[str, Plate]) -> None:
+        """Change what walls do; walls that are not named stand still."""
+        unknown = set(plates) - set(WALLS)
+        if unknown:
+            raise InputError(f"unknown wall {sorted(unknown)[0]!r}; known: {', '.join(WALLS)}")
+        self.plates = {name: plates.get(name, Plate()) for name in WALLS}
+        self.wall_velocities[:] = [plate.velocity for plate in self.plates.values()]
+        self._targets = np.array([np.nan if p.stress is None else p.stress for p in self.plates.values()])
+        self._top_speeds = np.array([p.top_speed or 0.0 for p in self.plates.values()])
+        self._wall_friction = np.array([math.tan(math.radians(p.friction_angle)) for p in self.plates.values()])
+
+    def set_material(self, material: Material) -> None:
+        """Change what the grains are made of, for instance their friction once a packing has its density."""
+        self.material = material
+        self._measure_grains()
+        self._stiffness = _pair_stiffness(material.young, self._pairs, self._state)
+        self._rim_stiffness = material.young * self._state[self._rims[:, 0], 3]
+        if self.step >= self.critical_step:
+            raise InputError(
+                f"the step of {self.step:.4g} s is above this material's critical one, {self.critical_step:.4g} s"
+            )
+
+    def scale_radii(self, factor: float) -> None:
+        """Grow or shrink all grains about their centres; the step keeps its part of the critical one."""
+        _check(factor, "factor", "a positive number", lambda x: x > 0.0)
+        part = self.step / self.critical_step
+        self._state[:, 3] *= factor
+        self._measure_grains()
+        self.step = part * self.critical_step
+        self._list_pairs()
+
+    def _measure_grains(self) -> None:
+        r = self._state[:, 3]
+        mass = 4.0 / 3.0 * np.pi * r**3 * self.material.density
+        self._inverse_mass = 1.0 / mass
+        self._inverse_inertia = 1.0 / (0.4 * mass * r**2)
+
+    @property
+    def critical_step(self) -> float:
+        """Least √(m/k) of a grain and the stiffest contact it may have, with the largest grain [s]."""
+        r = self._state[:, 3]
+        stiffest = 2.0 * self.material.young * r * r.max() / (r + r.max())
+        return float(np.sqrt(1.0 / (self._inverse_mass * stiffest)).min())
+
+    def _list_pairs(self) -> None:
+        """List the pairs that may touch before any grain has moved by half the skin, and keep what contacts hold."""
+        x, r = np.ascontiguousarray(self._state[:, :3]), np.ascontiguousarray(self._state[:, 3])
+        skin = _SKIN * float(r.min())
+        pairs = neighbour_pairs(x, r, skin)
+        shear, touching = np.zeros((len(pairs), 3)), np.zeros(len(pairs), bool)
+        _carry(self._pairs, self._shear, self._touching, pairs, shear, touching)
+        near = np.stack([x - self.places[0::2] < r[:, None] + skin, self.places[1::2] - x < r[:, None] + skin], axis=2)
+        rims = np.argwhere(near.reshape(-1, 6)).astype(np.int32)
+        rim_shear, rim_touching = np.zeros((len(rims), 3)), np.zeros(len(rims), bool)
+        _carry(self._rims, self._rim_shear, self._rim_touching, rims, rim_shear, rim_touching)
+        self._pairs, self._shear, self._touching = pairs, shear, touching
+        self._rims, self._rim_shear, self._rim_touching = rims, rim_shear, rim_touching
+        self._stiffness = _pair_stiffness(self.material.young, pairs, self._state)
+        self._rim_stiffness = self.material.young * r[rims[:, 0]]
+        self._shares = np.linspace(0, len(pairs), self.threads + 1).astype(np.int64)
+        self._rim_shares = np.linspace(0, len(rims), self.threads + 1).astype(np.int64)
+        self._start, self._wall_start = x, self.places.copy()
+        self._slack = skin
+
+    # ---- motion -------------------------------------------------------------------------------------------------
+
+    def run(self, steps: int) -> None:
+        """Take so many steps.
+
+        Raises
+        ------
+        ComputationError
+            If the motion runs away: a grain crosses a tenth of the smallest radius in one step, or is nowhere.
+        """
+        done = 0
+        fastest = _RUNAWAY * float(self._state[:, 3].min()) / self.step
+        before = self._state[:, :3].copy() if self._applied.any() else None
+        while done < steps:
+            with threads(self.threads):
+                taken, reason = advance(
+                    steps - done, self.step, self._state, self._inverse_mass, self._inverse_inertia, self._applied,
+                    self.gravity, self.damping,
+                    self._pairs, self._stiffness, self._shear, self._touching, self._shares,
+                    self._rims, self._rim_stiffness, self._rim_shear, self._rim_touching, self._rim_shares,
+                    self.material.stiffness_ratio, self.material.friction, self._wall_friction,
+                    self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN,
+                    self._loads, self._wall_loads, self._wall_forces, self._start, self._wall_start, self._slack,
+                    fastest, self._work,
+                )  # fmt: skip
+            done += taken
+            self.steps += taken
+            self.time += taken * self.step
+            if reason == RUNAWAY:
+                self._fail()
+            if reason == CROWDED:
+                self._list_pairs()
+        if before is not None:
+            self._applied_work += float((self._applied * (self._state[:, :3] - before)).sum())
+
+    def _fail(self) -> None:
+        speed = np.sqrt((self._state[:, 4:7] ** 2).sum(axis=1))
+        worst = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
+        raise ComputationError(
+            f"the motion runs away at step {self.steps}: grain {self._order[worst]} moves at {speed[worst]:.3g} m/s, "
+            f"over {_RUNAWAY} of the smallest radius in one step. A start with deep overlaps, a wall that is too fast "
+            "or forces applied from outside that grow do this; so does a step near the critical one"
+        )
+
+    def apply(self, forces: np.ndarray) -> None:
+        """Forces on the grains from outside, (n, 3) by id, until changed [N]."""
+        self._applied = np.ascontiguousarray(np.asarray(forces, float)[self._order])
+        if self._applied.shape != (len(self), 3) or not np.isfinite(self._applied).all():
+            raise InputError(f"forces must be ({len(self)}, 3) finite numbers")
+
+    @property
+    def applied(self) -> np.ndarray:
+        return self._applied[self._rank]
+
+    # ---- what there is ------------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self._state)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(n, 3): centres at time t [m]."""
+        return self._state[self._rank, :3]
+
+    @property
+    def radii(self) -> np.ndarray:
+        """(n,): radii [m]."""
+        return self._state[self._rank, 3]
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """(n, 3): velocities at time t - dt/2 [m/s]."""
+        return self._state[self._rank, 4:7]
+
+    @velocities.setter
+    def velocities(self, values: np.ndarray) -> None:
+        self._state[:, 4:7] = np.broadcast_to(values, (len(self), 3))[self._order]
+
+    @property
+    def spins(self) -> np.ndarray:
+        """(n, 3): angular velocities at time t - dt/2 [rad/s]."""
+        return self._state[self._rank, 7:10]
+
+    @spins.setter
+    def spins(self, values: np.ndarray) -> None:
+        self._state[:, 7:10] = np.broadcast_to(values, (len(self), 3))[self._order]
+
+    @property
+    def masses(self) -> np.ndarray:
+        """(n,): masses [kg]."""
+        return 1.0 / self._inverse_mass[self._rank]
+
+    @property
+    def box(self) -> Box:
+        """The box that the walls make now."""
+        return Box(self.places[0::2].copy(), self.places[1::2].copy())
+
+    @property
+    def packing(self) -> Packing:
+        """The grains where they are now, in their box."""
+        return Packing(self.positions, self.radii, self.box)
+
+    @property
+    def porosity(self) -> float:
+        """1 - Σ 4/3 π r³ / V: overlaps count twice, as they weigh."""
+        return 1.0 - float((4.0 / 3.0 * np.pi * self._state[:, 3] ** 3).sum()) / self.box.volume
+
+    @property
+    def contacts(self) -> Contacts:
+        """Contacts between grains, and then between grains and walls."""
+        x, r = self._state[:, :3], self._state[:, 3]
+        held = np.flatnonzero(self._overlaps() > 0.0)
+        i, j = self._pairs[held].T
+        branch = x[j] - x[i]
+        distance = np.sqrt((branch**2).sum(axis=1))
+        normals = branch / distance[:, None]
+        overlaps = r[i] + r[j] - distance
+        forces = self._shear[held] - (self._stiffness[held] * overlaps)[:, None] * normals
+        points = x[i] + (r[i] - 0.5 * overlaps)[:, None] * normals
+
+        walled = np.flatnonzero(self._rim_overlaps() > 0.0)
+        k, w = self._rims[walled].T
+        wall_normals = np.zeros((len(walled), 3))
+        wall_normals[np.arange(len(walled)), w // 2] = np.where(w % 2 == 1, 1.0, -1.0)
+        wall_overlaps = self._rim_overlaps()[walled]
+        wall_forces = self._rim_shear[walled] - (self._rim_stiffness[walled] * wall_overlaps)[:, None] * wall_normals
+        wall_points = x[k] + (r[k] - wall_overlaps)[:, None] * wall_normals
+        return Contacts(
+            np.concatenate(
+                [self._order[self._pairs[held]], np.stack([self._order[k], len(self) + w.astype(np.int64)], axis=1)]
+            ),
+            np.concatenate([normals, wall_normals]),
+            np.concatenate([points, wall_points]),
+            np.concatenate([forces, wall_forces]),
+            np.concatenate([overlaps, wall_overlaps]),
+        )
+
+    def _overlaps(self) -> np.ndarray:
+        x, r = self._state[:, :3], self._state[:, 3]
+        i, j = self._pairs.T
+        return r[i] + r[j] - np.sqrt(((x[j] - x[i]) ** 2).sum(axis=1))
+
+    def _rim_overlaps(self) -> np.ndarray:
+        k, w = self._rims.T
+        return self._state[k, 3] - np.where(w % 2 == 1, 1.0, -1.0) * (self.places[w] - self._state[k, w // 2])
+
+    @property
+    def coordination(self) -> float:
+        """Mean number of contacts of a grain, with grains and walls."""
+        grains = self.contacts.grains
+        return float(np.count_nonzero(grains < len(self)) / len(self))
+
+    @property
+    def stress(self) -> np.ndarray:
+        """(3, 3): mean stress of the grains, Σ f ⊗ (branch) / V over contacts, positive in compression [Pa]."""
+        contacts = self.contacts
+        x = self.positions
+        i, j = contacts.grains.T
+        ends = np.where((j < len(self))[:, None], x[np.minimum(j, len(self) - 1)], contacts.points)
+        return -np.einsum("ca,cb->ab", contacts.forces, ends - x[i]) / self.box.volume
+
+    @property
+    def wall_forces(self) -> np.ndarray:
+        """(6, 3): force of the grains on each wall [N]."""
+        contacts = self.contacts
+        forces = np.zeros((6, 3))
+        walled = contacts.grains[:, 1] >= len(self)
+        np.add.at(forces, contacts.grains[walled, 1] - len(self), -contacts.forces[walled])
+        return forces
+
+    @property
+    def wall_stress(self) -> dict[str, float]:
+        """Normal stress on each wall, positive in compression [Pa]."""
+        forces = self.wall_forces
+        return {
+            name: (1.0 if w % 2 else -1.0) * forces[w, w // 2] / self.box.section(w // 2)
+            for w, name in enumerate(WALLS)
+        }
+
+    @property
+    def unbalanced(self) -> float:
+        """Mean resultant force on a grain, relative to the mean contact force."""
+        contacts = self.contacts
+        if len(contacts) == 0:
+            return math.inf
+        mean = float(np.sqrt((contacts.forces**2).sum(axis=1)).mean())
+        loads, _ = self._forces()
+        total = loads[:, :3] + self._applied + self.gravity / self._inverse_mass[:, None]
+        return float(np.sqrt((total**2).sum(axis=1)).mean()) / mean
+
+    @property
+    def energies(self) -> Energies:
+        """Energies at time t."""
+        s = self._state
+        loads, _ = self._forces()
+        accelerations = (loads[:, :3] + self._applied) * self._inverse_mass[:, None] + self.gravity
+        turns = loads[:, 3:] * self._inverse_inertia[:, None]
+        v, w = s[:, 4:7], s[:, 7:10]
+        kinetic = 0.5 * ((v * (v + self.step * accelerations)).sum(axis=1) / self._inverse_mass).sum()
+        kinetic += 0.5 * ((w * (w + self.step * turns)).sum(axis=1) / self._inverse_inertia).sum()
+        elastic = 0.0
+        for overlaps, shear, stiffness in (
+            (self._overlaps(), self._shear, self._stiffness),
+            (self._rim_overlaps(), self._rim_shear, self._rim_stiffness),
+        ):
+            elastic += 0.5 * float((stiffness * np.maximum(overlaps, 0.0) ** 2).sum())
+            if self.material.stiffness_ratio > 0.0:
+                tangential = self.material.stiffness_ratio * stiffness
+                elastic += 0.5 * float(((shear**2).sum(axis=1) / tangential)[overlaps > 0.0].sum())
+        potential = -float(((s[:, :3] @ self.gravity) / self._inverse_mass).sum())
+        sliding, walls, damped = self._work
+        return Energies(float(kinetic), elastic, potential, sliding, damped, walls, self._applied_work)
+
+    def _forces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Contact loads on grains (n, 6), inside numbering, and on walls (6, 4); tangential forces as they stand."""
+        loads, wall_loads = np.zeros((len(self), 6)), np.zeros((6, 4))
+        grain_contacts(
+            0, len(self._pairs), self._state, self._pairs, self._stiffness, self.material.stiffness_ratio,
+            self.material.friction, 0.0, self._shear.copy(), self._touching.copy(), loads,
+        )  # fmt: skip
+        wall_contacts(
+            0, len(self._rims), self._state, self._rims, self._rim_stiffness, self.material.stiffness_ratio,
+            self._wall_friction, 0.0, self.places, self.wall_velocities, self._rim_shear.copy(),
+            self._rim_touching.copy(), loads, wall_loads,
+        )  # fmt: skip
+        return loads, wall_loads
+
+    def __repr__(self) -> str:
+        return f"DEM({len(self)} grains, {self.steps} steps of {self.step:.3g} s, porosity {self.porosity:.4f})"
+
+
+def _check(value: object, name: str, what: str, holds) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or not holds(value):
+        raise InputError(f"{name} must be {what}, not {value!r}")
+
+
+def _check_grains(packing: Packing) -> None:
+    """Grains must have a box, their centres in it, and none of their centres inside another grain."""
+    if packing.box is None:
+        raise InputError("the packing has no box; give it one: its walls hold the grains")
+    outside = ((packing.centres <= packing.box.lower) | (packing.centres >= packing.box.upper)).any(axis=1)
+    if outside.any():
+        grain = int(np.argmax(outside))
+        raise InputError(f"grain {grain} has its centre outside the box; move it, or enlarge the box")
+    pairs = neighbour_pairs(packing.centres, packing.radii)
+    i, j = pairs.T
+    depth = packing.radii[i] + packing.radii[j]
+    depth = depth - np.sqrt(((packing.centres[i] - packing.centres[j]) ** 2).sum(axis=1))
+    deep = depth > np.minimum(packing.radii[i], packing.radii[j])
+    if deep.any():
+        pair = int(np.argmax(deep))
+        raise InputError(
+            f"grains {i[pair]} and {j[pair]} overlap by {depth[pair]:.3g} m, more than the smaller's radius: contact "
+            "forces would throw them apart. Start from grains apart, or grow them (porefv.dem.grow)"
+        )
+
+
+@njit(cache=True)
+def _pair_stiffness(young, pairs, state):
+    """k_n = 2 E r_i r_j / (r_i + r_j) of each pair (C14 eq. 10)."""
+    stiffness = np.empty(pairs.shape[0])
+    for c in range(pairs.shape[0]):
+        a = state[pairs[c, 0], 3]
+        b = state[pairs[c, 1], 3]
+        stiffness[c] = 2.0 * young * a * b / (a + b)
+    return stiffness
+
+
+@njit(cache=True)
+def _carry(old_pairs, old_shear, old_touching, pairs, shear, touching):
+    """Hand what contacts hold from one sorted list of pairs to another."""
+    o = 0
+    for c in range(pairs.shape[0]):
+        while o < old_pairs.shape[0] and (
+            old_pairs[o, 0] < pairs[c, 0] or (old_pairs[o, 0] == pairs[c, 0] and old_pairs[o, 1] < pairs[c, 1])
+        ):
+            o += 1
+        if o < old_pairs.shape[0] and old_pairs[o, 0] == pairs[c, 0] and old_pairs[o, 1] == pairs[c, 1]:
+            touching[c] = old_touching[o]
+            for a in range(3):
+                shear[c, a] = old_shear[o, a]
