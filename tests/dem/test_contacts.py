@@ -89,7 +89,8 @@ def test_tangential_force_turns_with_a_pair_that_turns_as_one(spin):
     state[:, 3] = 0.1
     state[:, 7:] = spin
     branch, shear0 = np.array([0.19, 0.0, 0.0]), np.array([0.0, 1.0e-3, 0.5e-3])
-    pairs, stiffness = np.array([[0, 1]], np.int32), np.array([1.0e-3])  # next to none: what is there only turns
+    starts, others = np.array([0, 1, 1]), np.array([1], np.int32)
+    stiffness = np.array([1.0e-7])  # next to none: what is there only turns
     shear, touching = shear0[None].copy(), np.array([True])
     dt, steps = 1.0e-4, 20_000
     rate = np.sqrt(spin @ spin)
@@ -103,7 +104,7 @@ def test_tangential_force_turns_with_a_pair_that_turns_as_one(spin):
         half, whole = turned(branch, rate * dt * (step - 0.5)), turned(branch, rate * dt * step)
         state[1, :3] = whole
         state[1, 4:7] = np.cross(spin, half)
-        grain_contacts(0, 1, state, pairs, stiffness, 0.5, 1e9, dt, shear, touching, np.zeros((2, 6)))
+        grain_contacts(0, 1, state, starts, others, stiffness, 0.5, 1e12, dt, shear, touching, np.zeros((2, 6)))
     # To first order in the 3e-4 that it turns in a step.
     assert_allclose(shear[0], turned(shear0, rate * dt * steps), atol=1e-3 * np.abs(shear0).max())
     assert_allclose(shear[0] @ shear[0], shear0 @ shear0, rtol=1e-6)

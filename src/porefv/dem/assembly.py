@@ -224,7 +224,7 @@ class DEM:
         self.places = np.stack([packing.box.lower, packing.box.upper], axis=1).ravel()
         self.wall_velocities = np.zeros((6, 3))
         self._wall_forces = np.zeros((6, 3))
-        self._pairs = np.empty((0, 2), np.int32)
+        self._pairs, self._others = np.empty((0, 2), np.int32), np.empty(0, np.int32)
         self._shear, self._touching = np.empty((0, 3)), np.empty(0, bool)
         self._rims = np.empty((0, 2), np.int32)
         self._rim_shear, self._rim_touching = np.empty((0, 3)), np.empty(0, bool)
@@ -309,7 +309,11 @@ class DEM:
         self._rims, self._rim_shear, self._rim_touching = rims, rim_shear, rim_touching
         self._stiffness = _pair_stiffness(self.material.young, pairs, self._state)
         self._rim_stiffness = self.material.young * r[rims[:, 0]]
-        self._shares = np.linspace(0, len(pairs), self.threads + 1).astype(np.int64)
+        # Pairs of each grain with later ones, in a row; shares of grains with about equally many pairs.
+        self._starts = np.searchsorted(pairs[:, 0], np.arange(len(self) + 1))
+        self._others = np.ascontiguousarray(pairs[:, 1])
+        self._shares = np.searchsorted(self._starts, np.linspace(0, len(pairs), self.threads + 1))
+        self._shares[-1] = len(self)
         self._rim_shares = np.linspace(0, len(rims), self.threads + 1).astype(np.int64)
         self._start, self._wall_start = x, self.places.copy()
         self._slack = skin
@@ -332,7 +336,7 @@ class DEM:
                 taken, reason = advance(
                     steps - done, self.step, self._state, self._inverse_mass, self._inverse_inertia, self._applied,
                     self.gravity, self.damping,
-                    self._pairs, self._stiffness, self._shear, self._touching, self._shares,
+                    self._starts, self._others, self._stiffness, self._shear, self._touching, self._shares,
                     self._rims, self._rim_stiffness, self._rim_shear, self._rim_touching, self._rim_shares,
                     self.material.stiffness_ratio, self.material.friction, self._wall_friction,
                     self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN,
@@ -531,7 +535,7 @@ class DEM:
         """Contact loads on grains (n, 6), inside numbering, and on walls (6, 4); tangential forces as they stand."""
         loads, wall_loads = np.zeros((len(self), 6)), np.zeros((6, 4))
         grain_contacts(
-            0, len(self._pairs), self._state, self._pairs, self._stiffness, self.material.stiffness_ratio,
+            0, len(self), self._state, self._starts, self._others, self._stiffness, self.material.stiffness_ratio,
             self.material.friction, 0.0, self._shear.copy(), self._touching.copy(), loads,
         )  # fmt: skip
         wall_contacts(

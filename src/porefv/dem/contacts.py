@@ -7,8 +7,7 @@ touches, turned with the contact, and forgotten when it opens.
 Arrays of the kernels
     state (n, 10)       x y z r, vx vy vz, wx wy wz: centre, radius, velocity, spin of each grain
     loads (n, 6)        force and torque on each grain, added to
-    pairs (m, 2)        grains i < j that may touch
-    stiffness (m,)      k_n of each pair
+    stiffness (m,)      k_n of each pair of grains i < j that may touch
     shear (m, 3)        tangential force on i, zero unless touching
     touching (m,)       whether the pair touches
 """
@@ -18,79 +17,93 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+# Fused multiply-adds: quicker, and as deterministic on one machine.
+_FAST = {"contract", "nsz", "arcp"}
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def grain_contacts(first, last, state, pairs, stiffness, ratio, friction, dt, shear, touching, loads):
-    """Forces of the pairs first ... last - 1; returns the energy that sliding dissipates in this step.
 
-    `ratio` is k_s / k_n, `friction` tan φ; where either is zero nothing tangential is computed.
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
+def grain_contacts(first, last, state, starts, others, stiffness, ratio, friction, dt, shear, touching, loads):
+    """Forces of the pairs of grains first ... last - 1 with later ones; returns the energy sliding dissipates.
+
+    Pairs of grain i are starts[i] ... starts[i + 1], with the grains `others`. `ratio` is k_s / k_n, `friction` tan φ;
+    where either is zero nothing tangential is computed.
     """
     dissipated = 0.0
     frictional = ratio > 0.0 and friction > 0.0
-    for c in range(first, last):
-        i = pairs[c, 0]
-        j = pairs[c, 1]
-        nx = state[j, 0] - state[i, 0]
-        ny = state[j, 1] - state[i, 1]
-        nz = state[j, 2] - state[i, 2]
-        reach = state[i, 3] + state[j, 3]
-        square = nx * nx + ny * ny + nz * nz
-        if square >= reach * reach:
-            if touching[c]:
-                touching[c] = False
-                shear[c, 0] = shear[c, 1] = shear[c, 2] = 0.0
-            continue
-        touching[c] = True
-        distance = np.sqrt(square)
-        inverse = 1.0 / distance
-        nx *= inverse
-        ny *= inverse
-        nz *= inverse
-        kn = stiffness[c]
-        normal = kn * (reach - distance)
-        fx = -normal * nx
-        fy = -normal * ny
-        fz = -normal * nz
-        if frictional:
-            # Arms from the centres to the middle of the overlap: they add up to the distance.
-            arm_i = state[i, 3] - 0.5 * (reach - distance)
-            arm_j = distance - arm_i
-            slide, tx, ty, tz = _tangential(
-                nx, ny, nz, normal, kn * ratio, friction, dt,
-                state[j, 4] - state[i, 4], state[j, 5] - state[i, 5], state[j, 6] - state[i, 6],
-                arm_i * state[i, 7] + arm_j * state[j, 7],
-                arm_i * state[i, 8] + arm_j * state[j, 8],
-                arm_i * state[i, 9] + arm_j * state[j, 9],
-                0.5 * dt * ((state[i, 7] + state[j, 7]) * nx + (state[i, 8] + state[j, 8]) * ny
-                            + (state[i, 9] + state[j, 9]) * nz),
-                shear[c, 0], shear[c, 1], shear[c, 2],
-            )  # fmt: skip
-            dissipated += slide
-            shear[c, 0] = tx
-            shear[c, 1] = ty
-            shear[c, 2] = tz
-            fx += tx
-            fy += ty
-            fz += tz
-            qx = ny * tz - nz * ty
-            qy = nz * tx - nx * tz
-            qz = nx * ty - ny * tx
-            loads[i, 3] += arm_i * qx
-            loads[i, 4] += arm_i * qy
-            loads[i, 5] += arm_i * qz
-            loads[j, 3] += arm_j * qx
-            loads[j, 4] += arm_j * qy
-            loads[j, 5] += arm_j * qz
-        loads[i, 0] += fx
-        loads[i, 1] += fy
-        loads[i, 2] += fz
-        loads[j, 0] -= fx
-        loads[j, 1] -= fy
-        loads[j, 2] -= fz
+    for i in range(first, last):
+        xi, yi, zi, ri = state[i, 0], state[i, 1], state[i, 2], state[i, 3]
+        force_x = force_y = force_z = 0.0
+        torque_x = torque_y = torque_z = 0.0
+        for c in range(starts[i], starts[i + 1]):
+            j = others[c]
+            nx = state[j, 0] - xi
+            ny = state[j, 1] - yi
+            nz = state[j, 2] - zi
+            reach = ri + state[j, 3]
+            square = nx * nx + ny * ny + nz * nz
+            if square >= reach * reach:
+                if touching[c]:
+                    touching[c] = False
+                    shear[c, 0] = shear[c, 1] = shear[c, 2] = 0.0
+                continue
+            touching[c] = True
+            distance = np.sqrt(square)
+            inverse = 1.0 / distance
+            nx *= inverse
+            ny *= inverse
+            nz *= inverse
+            kn = stiffness[c]
+            normal = kn * (reach - distance)
+            fx = -normal * nx
+            fy = -normal * ny
+            fz = -normal * nz
+            if frictional:
+                # Arms from the centres to the middle of the overlap: they add up to the distance.
+                arm_i = ri - 0.5 * (reach - distance)
+                arm_j = distance - arm_i
+                slid, tx, ty, tz = _tangential(
+                    nx, ny, nz, normal, kn * ratio, friction, dt,
+                    state[j, 4] - state[i, 4], state[j, 5] - state[i, 5], state[j, 6] - state[i, 6],
+                    arm_i * state[i, 7] + arm_j * state[j, 7],
+                    arm_i * state[i, 8] + arm_j * state[j, 8],
+                    arm_i * state[i, 9] + arm_j * state[j, 9],
+                    0.5 * (state[i, 7] + state[j, 7]),
+                    0.5 * (state[i, 8] + state[j, 8]),
+                    0.5 * (state[i, 9] + state[j, 9]),
+                    shear[c, 0], shear[c, 1], shear[c, 2],
+                )  # fmt: skip
+                dissipated += slid
+                shear[c, 0] = tx
+                shear[c, 1] = ty
+                shear[c, 2] = tz
+                fx += tx
+                fy += ty
+                fz += tz
+                qx = ny * tz - nz * ty
+                qy = nz * tx - nx * tz
+                qz = nx * ty - ny * tx
+                torque_x += arm_i * qx
+                torque_y += arm_i * qy
+                torque_z += arm_i * qz
+                loads[j, 3] += arm_j * qx
+                loads[j, 4] += arm_j * qy
+                loads[j, 5] += arm_j * qz
+            force_x += fx
+            force_y += fy
+            force_z += fz
+            loads[j, 0] -= fx
+            loads[j, 1] -= fy
+            loads[j, 2] -= fz
+        loads[i, 0] += force_x
+        loads[i, 1] += force_y
+        loads[i, 2] += force_z
+        loads[i, 3] += torque_x
+        loads[i, 4] += torque_y
+        loads[i, 5] += torque_z
     return dissipated
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
 def wall_contacts(
     first, last, state, rims, stiffness, ratio, friction, dt, places, velocities, shear, touching, loads, wall_loads
 ):  # fmt: skip
@@ -126,7 +139,7 @@ def wall_contacts(
                 nx, ny, nz, normal, kn * ratio, friction[w], dt,
                 velocities[w, 0] - state[i, 4], velocities[w, 1] - state[i, 5], velocities[w, 2] - state[i, 6],
                 gap * state[i, 7], gap * state[i, 8], gap * state[i, 9],
-                dt * (state[i, 7] * nx + state[i, 8] * ny + state[i, 9] * nz),
+                state[i, 7], state[i, 8], state[i, 9],
                 shear[c, 0], shear[c, 1], shear[c, 2],
             )  # fmt: skip
             dissipated += slide
@@ -149,42 +162,35 @@ def wall_contacts(
     return dissipated
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _tangential(nx, ny, nz, normal, ks, friction, dt, ux, uy, uz, ax, ay, az, twist, sx, sy, sz):
-    """The tangential force on i after this step, and the energy dissipated by sliding.
+@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
+def _tangential(nx, ny, nz, normal, ks, friction, dt, ux, uy, uz, ax, ay, az, wx, wy, wz, sx, sy, sz):
+    """Energy dissipated by sliding, and the tangential force on i after this step.
 
-    n leads from i to j, u is the velocity of j's centre relative to i's, a the sum of arm times spin, `twist` the
-    angle the pair turns about n in this step, s the tangential force before it.
+    n leads from i to j, u is the velocity of j's centre relative to i's, a the sum of arm times spin, w the spin with
+    which the pair turns about n, s the tangential force before the step.
     """
-    # Turn with the contact: about n by the twist, and into the new plane without change of length.
+    # Turned with the pair, about n and into the new plane, and on by the slip of j's surface on i's; what is along n
+    # is taken out of all at once. Small turns keep the length to rounding, larger ones need a root to.
+    twist = dt * (wx * nx + wy * ny + wz * nz)
     size = sx * sx + sy * sy + sz * sz
-    if size > 0.0:
-        tx = sx + twist * (ny * sz - nz * sy)
-        ty = sy + twist * (nz * sx - nx * sz)
-        tz = sz + twist * (nx * sy - ny * sx)
-        off = tx * nx + ty * ny + tz * nz
-        sx = tx - off * nx
-        sy = ty - off * ny
-        sz = tz - off * nz
-        turned = sx * sx + sy * sy + sz * sz
-        if abs(turned - size) > 1e-12 * size and turned > 0.0:  # small turns keep it to rounding: no root needed
-            scale = np.sqrt(size / turned)
-            sx *= scale
-            sy *= scale
-            sz *= scale
-    # Velocity of j's surface relative to i's at the contact.
-    ux -= ay * nz - az * ny
-    uy -= az * nx - ax * nz
-    uz -= ax * ny - ay * nx
-    along = ux * nx + uy * ny + uz * nz
+    off = sx * nx + sy * ny + sz * nz
+    if off * off > 1e-12 * size or twist * twist > 1e-12:
+        scale = np.sqrt(size / max((size - off * off) * (1.0 + twist * twist), 1e-6 * size)) if size > 0.0 else 0.0
+        sx *= scale
+        sy *= scale
+        sz *= scale
     step = ks * dt
-    sx += step * (ux - along * nx)
-    sy += step * (uy - along * ny)
-    sz += step * (uz - along * nz)
+    tx = sx + twist * (ny * sz - nz * sy) + step * (ux - (ay * nz - az * ny))
+    ty = sy + twist * (nz * sx - nx * sz) + step * (uy - (az * nx - ax * nz))
+    tz = sz + twist * (nx * sy - ny * sx) + step * (uz - (ax * ny - ay * nx))
+    off = tx * nx + ty * ny + tz * nz
+    tx -= off * nx
+    ty -= off * ny
+    tz -= off * nz
     most = friction * normal
-    size = sx * sx + sy * sy + sz * sz
+    size = tx * tx + ty * ty + tz * tz
     if size <= most * most:
-        return 0.0, sx, sy, sz
+        return 0.0, tx, ty, tz
     size = np.sqrt(size)
     scale = most / size
-    return most * (size - most) / ks, sx * scale, sy * scale, sz * scale
+    return most * (size - most) / ks, tx * scale, ty * scale, tz * scale

@@ -21,7 +21,7 @@ DONE, CROWDED, RUNAWAY = 0, 1, 2
 @njit(cache=True, parallel=True, error_model="numpy")
 def advance(
     steps, dt, state, inverse_mass, inverse_inertia, applied, gravity, damping,
-    pairs, stiffness, shear, touching, pair_shares,
+    starts, others, stiffness, shear, touching, shares_of_grains,
     rims, rim_stiffness, rim_shear, rim_touching, rim_shares,
     ratio, friction, wall_friction,
     places, wall_velocities, targets, top_speeds, gains,
@@ -31,9 +31,9 @@ def advance(
 
     Parameters
     ----------
-    state, pairs, stiffness, shear, touching : see `porefv.dem.contacts`
+    state, starts, others, stiffness, shear, touching : see `porefv.dem.contacts`
     rims, rim_stiffness, rim_shear, rim_touching : the same for grains (first column) and walls (second)
-    pair_shares, rim_shares (s + 1,) : where each share's pairs start
+    shares_of_grains, rim_shares (s + 1,) : where each share's grains, with their pairs, and rims start
     inverse_mass, inverse_inertia (n,) ; applied (n, 3) : force from outside ; gravity (3,)
     damping : part of the acceleration taken off (added on) where it speeds a component of the motion up (slows it)
     places (6,), wall_velocities (6, 3) : of the walls ; targets (6,) : stress servo-controlled walls press with, else
@@ -45,7 +45,7 @@ def advance(
     work (3,) : energies added to: dissipated by sliding, put in by walls, taken by damping
     """
     n = state.shape[0]
-    shares = pair_shares.shape[0] - 1
+    shares = rim_shares.shape[0] - 1
     sliding = np.zeros(shares)
     damped = np.zeros(shares)
     far = np.zeros(shares)
@@ -53,12 +53,11 @@ def advance(
     bounds = np.zeros(shares + 1, np.int64)
     for s in range(shares + 1):
         bounds[s] = n * s // shares
-    turning = ratio > 0.0 and (friction > 0.0 or wall_friction.max() > 0.0)
     for step in range(steps):
         for s in prange(shares):
             sliding[s] = grain_contacts(
-                pair_shares[s], pair_shares[s + 1], state, pairs, stiffness, ratio, friction, dt, shear, touching,
-                loads[s],
+                shares_of_grains[s], shares_of_grains[s + 1], state, starts, others, stiffness, ratio, friction, dt,
+                shear, touching, loads[s],
             )  # fmt: skip
             sliding[s] += wall_contacts(
                 rim_shares[s], rim_shares[s + 1], state, rims, rim_stiffness, ratio, wall_friction, dt,
@@ -68,7 +67,7 @@ def advance(
         for s in prange(shares):
             damped[s], far[s], runaway[s] = _move(
                 bounds[s], bounds[s + 1], dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping,
-                turning, start, fastest,
+                start, fastest,
             )  # fmt: skip
         work[0] += sliding.sum()
         work[2] += damped.sum()
@@ -85,9 +84,9 @@ def advance(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _move(
-    first, last, dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping, turning, start, fastest
+    first, last, dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping, start, fastest
 ):  # fmt: skip
-    """Velocities and places of grains first ... last - 1 after a step.
+    """Velocities and places of grains first ... last - 1 after a step; takes their loads.
 
     Returns the energy taken by damping, the largest square of a distance moved since `start`, and whether any grain
     is faster than `fastest`, or nowhere.
@@ -95,42 +94,59 @@ def _move(
     damped = 0.0
     far = 0.0
     runaway = False
+    gx, gy, gz = gravity[0], gravity[1], gravity[2]
     for i in range(first, last):
-        square = 0.0
-        moved = 0.0
-        for a in range(3):
-            force = applied[i, a]
-            for s in range(loads.shape[0]):
-                force += loads[s, i, a]
+        fx, fy, fz = applied[i, 0], applied[i, 1], applied[i, 2]
+        tx = ty = tz = 0.0
+        for s in range(loads.shape[0]):
+            fx += loads[s, i, 0]
+            fy += loads[s, i, 1]
+            fz += loads[s, i, 2]
+            tx += loads[s, i, 3]
+            ty += loads[s, i, 4]
+            tz += loads[s, i, 5]
+            for a in range(6):
                 loads[s, i, a] = 0.0
-            acceleration = force * inverse_mass[i] + gravity[a]
-            v = state[i, 4 + a]
-            if damping > 0.0:
-                drag = -damping * abs(acceleration) * np.sign(v)
-                damped -= drag * (v + 0.5 * dt * acceleration) * dt / inverse_mass[i]
-                acceleration += drag
-            v += dt * acceleration
-            state[i, 4 + a] = v
-            state[i, a] += dt * v
-            square += v * v
-            moved += (state[i, a] - start[i, a]) ** 2
-        far = max(far, moved)
-        if not square <= fastest * fastest:  # so that NaN counts
+        ax = inverse_mass[i] * fx + gx
+        ay = inverse_mass[i] * fy + gy
+        az = inverse_mass[i] * fz + gz
+        bx = inverse_inertia[i] * tx
+        by = inverse_inertia[i] * ty
+        bz = inverse_inertia[i] * tz
+        if damping > 0.0:
+            ax, lost_x = _damp(ax, state[i, 4], damping, dt)
+            ay, lost_y = _damp(ay, state[i, 5], damping, dt)
+            az, lost_z = _damp(az, state[i, 6], damping, dt)
+            damped += (lost_x + lost_y + lost_z) / inverse_mass[i]
+            bx, lost_x = _damp(bx, state[i, 7], damping, dt)
+            by, lost_y = _damp(by, state[i, 8], damping, dt)
+            bz, lost_z = _damp(bz, state[i, 9], damping, dt)
+            damped += (lost_x + lost_y + lost_z) / inverse_inertia[i]
+        vx = state[i, 4] + dt * ax
+        vy = state[i, 5] + dt * ay
+        vz = state[i, 6] + dt * az
+        state[i, 4], state[i, 5], state[i, 6] = vx, vy, vz
+        state[i, 7] += dt * bx
+        state[i, 8] += dt * by
+        state[i, 9] += dt * bz
+        x = state[i, 0] + dt * vx
+        y = state[i, 1] + dt * vy
+        z = state[i, 2] + dt * vz
+        state[i, 0], state[i, 1], state[i, 2] = x, y, z
+        x -= start[i, 0]
+        y -= start[i, 1]
+        z -= start[i, 2]
+        far = max(far, x * x + y * y + z * z)
+        if not vx * vx + vy * vy + vz * vz <= fastest * fastest:  # so that NaN counts
             runaway = True
-        if turning:
-            for a in range(3):
-                torque = 0.0
-                for s in range(loads.shape[0]):
-                    torque += loads[s, i, 3 + a]
-                    loads[s, i, 3 + a] = 0.0
-                acceleration = torque * inverse_inertia[i]
-                spin = state[i, 7 + a]
-                if damping > 0.0:
-                    drag = -damping * abs(acceleration) * np.sign(spin)
-                    damped -= drag * (spin + 0.5 * dt * acceleration) * dt / inverse_inertia[i]
-                    acceleration += drag
-                state[i, 7 + a] = spin + dt * acceleration
     return damped, far, runaway
+
+
+@njit(cache=True, nogil=True)
+def _damp(acceleration, velocity, damping, dt):
+    """The acceleration less its damped part, against the velocity, and the energy per mass that this takes."""
+    drag = -damping * abs(acceleration) * np.sign(velocity)
+    return acceleration + drag, -drag * (velocity + 0.5 * dt * (acceleration + drag)) * dt
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
