@@ -318,7 +318,7 @@ def test_runs_repeat_exactly_and_threads_agree_but_for_rounding():
     rough = Material(young=E, stiffness_ratio=0.5, friction_angle=30.0, density=1000.0)
 
     def final(threads):
-        dem = gas(material=rough, threads=threads)
+        dem = gas(material=rough, threads=threads, step=1e-3)
         dem.run(2000)
         return dem.positions
 

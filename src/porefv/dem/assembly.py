@@ -17,9 +17,9 @@ from porefv.packing import WALLS, Box, Packing
 from porefv.tessellation.ordering import morton_codes
 from porefv.threads import threads
 
-# The step, as a part of the critical one √(m/k): motion was stable to 0.56 of it in the densest packing with the
-# highest friction we tried (benchmarks/dem.py); half of that is taken.
-SAFETY = 0.3
+# The step, as a part of the critical one √(m/k): motion was stable to 0.85 of it or more in a dense packing, whatever
+# its friction (benchmarks/dem.py).
+SAFETY = 0.5
 # A grain that covers more than this part of the smallest radius in one step has passed others unseen.
 _RUNAWAY = 0.1
 # Part of the way to balance, by the stiffness of its contacts, that a pressing wall moves in one step.

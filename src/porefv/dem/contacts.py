@@ -2,7 +2,7 @@
 
 Normal force k_n u_n where two spheres overlap by u_n, none where they do not; tangential force by increments of
 k_s times the slip, at most tan φ times the normal force. The tangential force is kept per pair while the pair
-touches, turned with the contact, and forgotten when it opens.
+touches, turned with the contact, and forgotten when it opens. A wall stands for the mirror image of the grain it meets.
 
 Arrays of the kernels
     state (n, 10)       x y z r, vx vy vz, wx wy wz: centre, radius, velocity, spin of each grain
@@ -10,6 +10,8 @@ Arrays of the kernels
     stiffness (m,)      k_n of each pair of grains i < j that may touch
     shear (m, 3)        tangential force on i, zero unless touching
     touching (m,)       whether the pair touches
+
+Frictional contacts are worked out a block at a time, from columns of numbers that the processor takes four by four.
 """
 
 from __future__ import annotations
@@ -17,180 +19,260 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-# Fused multiply-adds: quicker, and as deterministic on one machine.
-_FAST = {"contract", "nsz", "arcp"}
+# Contacts in a block, and where each quantity's column starts in it: given ...
+_SIZE = 128
+_BRANCH = 0 * _SIZE  # from i to j, three columns
+_RADIUS = 3 * _SIZE  # of i
+_REACH = 4 * _SIZE  # r_i + r_j
+_MOTION = 5 * _SIZE  # velocity of j less that of i, three columns
+_SPIN_I = 8 * _SIZE  # three columns
+_SPIN_J = 11 * _SIZE  # three columns
+_SHEAR = 14 * _SIZE  # tangential force on i, three columns, before and after
+_NORMAL_STIFFNESS = 17 * _SIZE
+_SHEAR_STIFFNESS = 18 * _SIZE
+_FRICTION = 19 * _SIZE  # tan φ
+# ... and found.
+_FORCE = 20 * _SIZE  # on i, three columns
+_TORQUE_I = 23 * _SIZE  # three columns
+_TORQUE_J = 26 * _SIZE  # three columns
+_SLID = 29 * _SIZE  # energy dissipated
+_COLUMNS = 30 * _SIZE
+
+# Contracted multiply-adds and no care for infinities: quicker, and as repeatable on one machine.
+_FAST = {"contract", "nsz", "arcp", "nnan", "ninf"}
+_TINY = 1e-300
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
+@njit(cache=True, error_model="numpy", nogil=True)
 def grain_contacts(first, last, state, starts, others, stiffness, ratio, friction, dt, shear, touching, loads):
-    """Forces of the pairs of grains first ... last - 1 with later ones; returns the energy sliding dissipates.
+    """Forces of the pairs of grains first ... last - 1 with later ones; returns the energy that sliding dissipates.
 
     Pairs of grain i are starts[i] ... starts[i + 1], with the grains `others`. `ratio` is k_s / k_n, `friction` tan φ;
     where either is zero nothing tangential is computed.
     """
-    dissipated = 0.0
     frictional = ratio > 0.0 and friction > 0.0
+    block = np.empty(_COLUMNS)
+    pair = np.empty(_SIZE, np.int64)
+    grain = np.empty(_SIZE, np.int64)
+    dissipated = 0.0
+    m = 0
     for i in range(first, last):
-        xi, yi, zi, ri = state[i, 0], state[i, 1], state[i, 2], state[i, 3]
-        force_x = force_y = force_z = 0.0
-        torque_x = torque_y = torque_z = 0.0
+        x = state[i, 0]
+        y = state[i, 1]
+        z = state[i, 2]
+        r = state[i, 3]
         for c in range(starts[i], starts[i + 1]):
             j = others[c]
-            nx = state[j, 0] - xi
-            ny = state[j, 1] - yi
-            nz = state[j, 2] - zi
-            reach = ri + state[j, 3]
-            square = nx * nx + ny * ny + nz * nz
+            dx = state[j, 0] - x
+            dy = state[j, 1] - y
+            dz = state[j, 2] - z
+            reach = r + state[j, 3]
+            square = dx * dx + dy * dy + dz * dz
             if square >= reach * reach:
                 if touching[c]:
                     touching[c] = False
                     shear[c, 0] = shear[c, 1] = shear[c, 2] = 0.0
                 continue
             touching[c] = True
-            distance = np.sqrt(square)
-            inverse = 1.0 / distance
-            nx *= inverse
-            ny *= inverse
-            nz *= inverse
-            kn = stiffness[c]
-            normal = kn * (reach - distance)
-            fx = -normal * nx
-            fy = -normal * ny
-            fz = -normal * nz
-            if frictional:
-                # Arms from the centres to the middle of the overlap: they add up to the distance.
-                arm_i = ri - 0.5 * (reach - distance)
-                arm_j = distance - arm_i
-                slid, tx, ty, tz = _tangential(
-                    nx, ny, nz, normal, kn * ratio, friction, dt,
-                    state[j, 4] - state[i, 4], state[j, 5] - state[i, 5], state[j, 6] - state[i, 6],
-                    arm_i * state[i, 7] + arm_j * state[j, 7],
-                    arm_i * state[i, 8] + arm_j * state[j, 8],
-                    arm_i * state[i, 9] + arm_j * state[j, 9],
-                    0.5 * (state[i, 7] + state[j, 7]),
-                    0.5 * (state[i, 8] + state[j, 8]),
-                    0.5 * (state[i, 9] + state[j, 9]),
-                    shear[c, 0], shear[c, 1], shear[c, 2],
-                )  # fmt: skip
-                dissipated += slid
-                shear[c, 0] = tx
-                shear[c, 1] = ty
-                shear[c, 2] = tz
-                fx += tx
-                fy += ty
-                fz += tz
-                qx = ny * tz - nz * ty
-                qy = nz * tx - nx * tz
-                qz = nx * ty - ny * tx
-                torque_x += arm_i * qx
-                torque_y += arm_i * qy
-                torque_z += arm_i * qz
-                loads[j, 3] += arm_j * qx
-                loads[j, 4] += arm_j * qy
-                loads[j, 5] += arm_j * qz
-            force_x += fx
-            force_y += fy
-            force_z += fz
-            loads[j, 0] -= fx
-            loads[j, 1] -= fy
-            loads[j, 2] -= fz
-        loads[i, 0] += force_x
-        loads[i, 1] += force_y
-        loads[i, 2] += force_z
-        loads[i, 3] += torque_x
-        loads[i, 4] += torque_y
-        loads[i, 5] += torque_z
+            if not frictional:
+                distance = np.sqrt(square)
+                push = stiffness[c] * (reach - distance) / distance
+                loads[i, 0] -= push * dx
+                loads[i, 1] -= push * dy
+                loads[i, 2] -= push * dz
+                loads[j, 0] += push * dx
+                loads[j, 1] += push * dy
+                loads[j, 2] += push * dz
+                continue
+            pair[m] = c
+            grain[m] = i
+            block[_BRANCH + m] = dx
+            block[_BRANCH + _SIZE + m] = dy
+            block[_BRANCH + 2 * _SIZE + m] = dz
+            block[_RADIUS + m] = r
+            block[_REACH + m] = reach
+            for a in range(3):
+                block[_MOTION + a * _SIZE + m] = state[j, 4 + a] - state[i, 4 + a]
+                block[_SPIN_I + a * _SIZE + m] = state[i, 7 + a]
+                block[_SPIN_J + a * _SIZE + m] = state[j, 7 + a]
+                block[_SHEAR + a * _SIZE + m] = shear[c, a]
+            block[_NORMAL_STIFFNESS + m] = stiffness[c]
+            block[_SHEAR_STIFFNESS + m] = ratio * stiffness[c]
+            block[_FRICTION + m] = friction
+            m += 1
+            if m == _SIZE:
+                _contact_law(m, dt, block)
+                dissipated += _hand_out(m, block, pair, grain, others, shear, loads)
+                m = 0
+    _contact_law(m, dt, block)
+    return dissipated + _hand_out(m, block, pair, grain, others, shear, loads)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _hand_out(m, block, pair, grain, others, shear, loads):
+    """Add what a block has found to the loads of its grains."""
+    dissipated = 0.0
+    for k in range(m):
+        c = pair[k]
+        i = grain[k]
+        j = others[c]
+        for a in range(3):
+            shear[c, a] = block[_SHEAR + a * _SIZE + k]
+            loads[i, a] += block[_FORCE + a * _SIZE + k]
+            loads[j, a] -= block[_FORCE + a * _SIZE + k]
+            loads[i, 3 + a] += block[_TORQUE_I + a * _SIZE + k]
+            loads[j, 3 + a] += block[_TORQUE_J + a * _SIZE + k]
+        dissipated += block[_SLID + k]
     return dissipated
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
+@njit(cache=True, error_model="numpy", nogil=True)
 def wall_contacts(
     first, last, state, rims, stiffness, ratio, friction, dt, places, velocities, shear, touching, loads, wall_loads
 ):  # fmt: skip
-    """Forces between grains and walls, rims (m, 2): grain and wall; a wall counts as a sphere of the grain's size.
+    """Forces between grains and walls, rims (m, 2): grain and wall; returns the energy that sliding dissipates.
 
     Wall w is normal to axis w // 2, at places[w] along it, and moves with velocities[w]; wall_loads (6, 4), added to,
-    holds the force on it and the sum of the stiffnesses of its contacts. Returns the energy that sliding dissipates.
+    holds the force on it and the sum of the stiffnesses of its contacts. `friction` (6,) is tan φ.
     """
+    block = np.empty(_COLUMNS)
+    pair = np.empty(_SIZE, np.int64)
     dissipated = 0.0
+    m = 0
     for c in range(first, last):
         i = rims[c, 0]
         w = rims[c, 1]
         axis = w // 2
-        sense = 1.0 if w % 2 == 1 else -1.0
         r = state[i, 3]
-        gap = sense * (places[w] - state[i, axis])
-        if gap >= r:
+        ahead = places[w] - state[i, axis]
+        if (ahead if w % 2 == 1 else -ahead) >= r:
             if touching[c]:
                 touching[c] = False
                 shear[c, 0] = shear[c, 1] = shear[c, 2] = 0.0
             continue
         touching[c] = True
-        kn = stiffness[c]
-        normal = kn * (r - gap)
-        nx = sense if axis == 0 else 0.0
-        ny = sense if axis == 1 else 0.0
-        nz = sense if axis == 2 else 0.0
-        fx = -normal * nx
-        fy = -normal * ny
-        fz = -normal * nz
-        if ratio > 0.0 and friction[w] > 0.0:
-            slide, tx, ty, tz = _tangential(
-                nx, ny, nz, normal, kn * ratio, friction[w], dt,
-                velocities[w, 0] - state[i, 4], velocities[w, 1] - state[i, 5], velocities[w, 2] - state[i, 6],
-                gap * state[i, 7], gap * state[i, 8], gap * state[i, 9],
-                state[i, 7], state[i, 8], state[i, 9],
-                shear[c, 0], shear[c, 1], shear[c, 2],
-            )  # fmt: skip
-            dissipated += slide
-            shear[c, 0] = tx
-            shear[c, 1] = ty
-            shear[c, 2] = tz
-            fx += tx
-            fy += ty
-            fz += tz
-            loads[i, 3] += gap * (ny * tz - nz * ty)
-            loads[i, 4] += gap * (nz * tx - nx * tz)
-            loads[i, 5] += gap * (nx * ty - ny * tx)
-        loads[i, 0] += fx
-        loads[i, 1] += fy
-        loads[i, 2] += fz
-        wall_loads[w, 0] -= fx
-        wall_loads[w, 1] -= fy
-        wall_loads[w, 2] -= fz
-        wall_loads[w, 3] += kn
+        if not (ratio > 0.0 and friction[w] > 0.0):
+            push = stiffness[c] * ((r if ahead > 0.0 else -r) - ahead)
+            loads[i, axis] -= push
+            wall_loads[w, axis] += push
+            wall_loads[w, 3] += stiffness[c]
+            continue
+        pair[m] = c
+        # The mirror image overlaps the grain twice as deep as the wall does, and does not spin.
+        for a in range(3):
+            block[_BRANCH + a * _SIZE + m] = 2.0 * ahead if a == axis else 0.0
+            block[_MOTION + a * _SIZE + m] = velocities[w, a] - state[i, 4 + a]
+            block[_SPIN_I + a * _SIZE + m] = state[i, 7 + a]
+            block[_SPIN_J + a * _SIZE + m] = 0.0
+            block[_SHEAR + a * _SIZE + m] = shear[c, a]
+        block[_RADIUS + m] = r
+        block[_REACH + m] = 2.0 * r
+        block[_NORMAL_STIFFNESS + m] = 0.5 * stiffness[c]
+        block[_SHEAR_STIFFNESS + m] = ratio * stiffness[c]
+        block[_FRICTION + m] = friction[w]
+        m += 1
+        if m == _SIZE:
+            _contact_law(m, dt, block)
+            dissipated += _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads)
+            m = 0
+    _contact_law(m, dt, block)
+    return dissipated + _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads):
+    """Add what a block has found to the loads of its grains and walls."""
+    dissipated = 0.0
+    for k in range(m):
+        c = pair[k]
+        i = rims[c, 0]
+        w = rims[c, 1]
+        for a in range(3):
+            shear[c, a] = block[_SHEAR + a * _SIZE + k]
+            loads[i, a] += block[_FORCE + a * _SIZE + k]
+            loads[i, 3 + a] += block[_TORQUE_I + a * _SIZE + k]
+            wall_loads[w, a] -= block[_FORCE + a * _SIZE + k]
+        wall_loads[w, 3] += stiffness[c]
+        dissipated += block[_SLID + k]
     return dissipated
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
-def _tangential(nx, ny, nz, normal, ks, friction, dt, ux, uy, uz, ax, ay, az, wx, wy, wz, sx, sy, sz):
-    """Energy dissipated by sliding, and the tangential force on i after this step.
+def _contact_law(m, dt, block):
+    """Forces, torques and dissipation of the first m contacts of a block.
 
-    n leads from i to j, u is the velocity of j's centre relative to i's, a the sum of arm times spin, w the spin with
-    which the pair turns about n, s the tangential force before the step.
+    Free of branches, so that it is compiled to work on several contacts at once.
     """
-    # Turned with the pair, about n and into the new plane, and on by the slip of j's surface on i's; what is along n
-    # is taken out of all at once. Small turns keep the length to rounding, larger ones need a root to.
-    twist = dt * (wx * nx + wy * ny + wz * nz)
-    size = sx * sx + sy * sy + sz * sz
-    off = sx * nx + sy * ny + sz * nz
-    if off * off > 1e-12 * size or twist * twist > 1e-12:
-        scale = np.sqrt(size / max((size - off * off) * (1.0 + twist * twist), 1e-6 * size)) if size > 0.0 else 0.0
+    for k in range(m):
+        nx = block[_BRANCH + k]
+        ny = block[_BRANCH + _SIZE + k]
+        nz = block[_BRANCH + 2 * _SIZE + k]
+        distance = np.sqrt(nx * nx + ny * ny + nz * nz)
+        inverse = 1.0 / distance
+        nx *= inverse
+        ny *= inverse
+        nz *= inverse
+        overlap = block[_REACH + k] - distance
+        normal = block[_NORMAL_STIFFNESS + k] * overlap
+        # Arms from the centres to the middle of the overlap: they add up to the distance.
+        arm_i = block[_RADIUS + k] - 0.5 * overlap
+        arm_j = distance - arm_i
+        ix = block[_SPIN_I + k]
+        iy = block[_SPIN_I + _SIZE + k]
+        iz = block[_SPIN_I + 2 * _SIZE + k]
+        jx = block[_SPIN_J + k]
+        jy = block[_SPIN_J + _SIZE + k]
+        jz = block[_SPIN_J + 2 * _SIZE + k]
+        # Velocity of j's surface relative to i's, where they touch: u - (arm_i w_i + arm_j w_j) x n.
+        ax = arm_i * ix + arm_j * jx
+        ay = arm_i * iy + arm_j * jy
+        az = arm_i * iz + arm_j * jz
+        ux = block[_MOTION + k] - (ay * nz - az * ny)
+        uy = block[_MOTION + _SIZE + k] - (az * nx - ax * nz)
+        uz = block[_MOTION + 2 * _SIZE + k] - (ax * ny - ay * nx)
+        # The tangential force turns with the pair, about n and into the new plane, without change of length ...
+        twist = 0.5 * dt * ((ix + jx) * nx + (iy + jy) * ny + (iz + jz) * nz)
+        sx = block[_SHEAR + k]
+        sy = block[_SHEAR + _SIZE + k]
+        sz = block[_SHEAR + 2 * _SIZE + k]
+        size = sx * sx + sy * sy + sz * sz
+        off = sx * nx + sy * ny + sz * nz
+        turned = (size - off * off) * (1.0 + twist * twist)
+        scale = np.sqrt(size / max(turned, 1e-6 * size + _TINY))
         sx *= scale
         sy *= scale
         sz *= scale
-    step = ks * dt
-    tx = sx + twist * (ny * sz - nz * sy) + step * (ux - (ay * nz - az * ny))
-    ty = sy + twist * (nz * sx - nx * sz) + step * (uy - (az * nx - ax * nz))
-    tz = sz + twist * (nx * sy - ny * sx) + step * (uz - (ax * ny - ay * nx))
-    off = tx * nx + ty * ny + tz * nz
-    tx -= off * nx
-    ty -= off * ny
-    tz -= off * nz
-    most = friction * normal
-    size = tx * tx + ty * ty + tz * tz
-    if size <= most * most:
-        return 0.0, tx, ty, tz
-    size = np.sqrt(size)
-    scale = most / size
-    return most * (size - most) / ks, tx * scale, ty * scale, tz * scale
+        # ... and grows by the slip; what is along n is taken out of all at once.
+        ks = block[_SHEAR_STIFFNESS + k]
+        step = ks * dt
+        tx = sx + twist * (ny * sz - nz * sy) + step * ux
+        ty = sy + twist * (nz * sx - nx * sz) + step * uy
+        tz = sz + twist * (nx * sy - ny * sx) + step * uz
+        off = tx * nx + ty * ny + tz * nz
+        tx -= off * nx
+        ty -= off * ny
+        tz -= off * nz
+        # Coulomb's limit.
+        size = np.sqrt(tx * tx + ty * ty + tz * tz)
+        most = block[_FRICTION + k] * normal
+        excess = max(size - most, 0.0)
+        block[_SLID + k] = min(size, most) * excess / (ks + _TINY)
+        scale = 1.0 - excess / (size + _TINY)
+        tx *= scale
+        ty *= scale
+        tz *= scale
+        block[_SHEAR + k] = tx
+        block[_SHEAR + _SIZE + k] = ty
+        block[_SHEAR + 2 * _SIZE + k] = tz
+        block[_FORCE + k] = tx - normal * nx
+        block[_FORCE + _SIZE + k] = ty - normal * ny
+        block[_FORCE + 2 * _SIZE + k] = tz - normal * nz
+        qx = ny * tz - nz * ty
+        qy = nz * tx - nx * tz
+        qz = nx * ty - ny * tx
+        block[_TORQUE_I + k] = arm_i * qx
+        block[_TORQUE_I + _SIZE + k] = arm_i * qy
+        block[_TORQUE_I + 2 * _SIZE + k] = arm_i * qz
+        block[_TORQUE_J + k] = arm_j * qx
+        block[_TORQUE_J + _SIZE + k] = arm_j * qy
+        block[_TORQUE_J + 2 * _SIZE + k] = arm_j * qz
