@@ -186,7 +186,7 @@ def cells_grid(mesh: PoreMesh, **cell_data: Any) -> vtkUnstructuredGrid:
     vtk = vtk_data_model()
     solids = polyhedra(mesh)
     grid = vtk.vtkUnstructuredGrid()
-    grid.SetPoints(_vtk_points(solids.points))
+    grid.SetPoints(vtk_points(solids.points))
     cells = vtk.vtkCellArray()
     cells.SetData(_vtk_array(solids.offsets), _vtk_array(solids.connectivity))
     grid.SetCells(_vtk_array(solids.types), cells)
@@ -199,7 +199,7 @@ def cells_grid(mesh: PoreMesh, **cell_data: Any) -> vtkUnstructuredGrid:
                 f"or per pore ({mesh.n_pores})"
             )
         data[name] = values if len(values) == mesh.n_cells else values[mesh.cell_pore]
-    _attach(grid.GetCellData(), data)
+    attach(grid.GetCellData(), data)
     return grid
 
 
@@ -207,9 +207,9 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows)."""
     n = len(packing)
     polydata = vtk_data_model().vtkPolyData()
-    polydata.SetPoints(_vtk_points(packing.centres))
-    polydata.SetVerts(_cell_array(np.arange(n)[:, None]))
-    _attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data})
+    polydata.SetPoints(vtk_points(packing.centres))
+    polydata.SetVerts(cell_array(np.arange(n)[:, None]))
+    attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data})
     return polydata
 
 
@@ -224,9 +224,9 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
         count = np.bincount(mesh.cell_pore, minlength=mesh.n_pores)
         points = np.stack([np.bincount(mesh.cell_pore, x, mesh.n_pores) / count for x in points.T], axis=1)
     polydata = vtk_data_model().vtkPolyData()
-    polydata.SetPoints(_vtk_points(points))
-    polydata.SetLines(_cell_array(throats.pores))
-    _attach(polydata.GetCellData(), cell_data)
+    polydata.SetPoints(vtk_points(points))
+    polydata.SetLines(cell_array(throats.pores))
+    attach(polydata.GetCellData(), cell_data)
     return polydata
 
 
@@ -269,7 +269,7 @@ def _vtk_array(values: np.ndarray):
     return numpy_to_vtk(np.ascontiguousarray(values))
 
 
-def _vtk_points(points: np.ndarray):
+def vtk_points(points: np.ndarray):
     from vtkmodules.vtkCommonCore import vtkPoints
 
     vtk_points = vtkPoints()
@@ -277,14 +277,14 @@ def _vtk_points(points: np.ndarray):
     return vtk_points
 
 
-def _cell_array(rows: np.ndarray):
+def cell_array(rows: np.ndarray):
     """Cells of one size: their points are the rows."""
     cells = vtk_data_model().vtkCellArray()
     cells.SetData(rows.shape[1], _vtk_array(rows.ravel().astype(np.int64)))
     return cells
 
 
-def _attach(attributes, arrays: dict[str, np.ndarray]) -> None:
+def attach(attributes, arrays: dict[str, np.ndarray]) -> None:
     for name, values in arrays.items():
         array = _vtk_array(values)
         array.SetName(name)

@@ -127,7 +127,7 @@ class Energies:
     """Energies [J]: what there is, and what has come and gone since the start.
 
     Kinetic energy is ½ m v(t - dt/2)·v(t + dt/2) and the like for spins: with it the total is conserved exactly by the
-    leapfrog on linear contacts that neither open nor close.
+    leapfrog on linear contacts that neither open nor close, without damping.
     """
 
     kinetic: float
@@ -263,14 +263,15 @@ class DEM:
 
     def set_material(self, material: Material) -> None:
         """Change what the grains are made of, for instance their friction once a packing has its density."""
+        # √(m/k) goes with √(ρ/E), whatever the grains.
+        change = math.sqrt(material.density / material.young * self.material.young / self.material.density)
+        critical = change * self.critical_step
+        if self.step >= critical:
+            raise InputError(f"the step of {self.step:.4g} s is above this material's critical one, {critical:.4g} s")
         self.material = material
         self._measure_grains()
         self._stiffness = _pair_stiffness(material.young, self._pairs, self._state)
         self._rim_stiffness = material.young * self._state[self._rims[:, 0], 3]
-        if self.step >= self.critical_step:
-            raise InputError(
-                f"the step of {self.step:.4g} s is above this material's critical one, {self.critical_step:.4g} s"
-            )
 
     def scale_radii(self, factor: float) -> None:
         """Grow or shrink all grains about their centres; the step keeps its part of the critical one."""
@@ -302,7 +303,7 @@ class DEM:
         shear, touching = np.zeros((len(pairs), 3)), np.zeros(len(pairs), bool)
         _carry(self._pairs, self._shear, self._touching, pairs, shear, touching)
         near = np.stack([x - self.places[0::2] < r[:, None] + skin, self.places[1::2] - x < r[:, None] + skin], axis=2)
-        rims = np.argwhere(near.reshape(-1, 6)).astype(np.int32)
+        rims = np.ascontiguousarray(np.argwhere(near.reshape(-1, 6)), dtype=np.int32)
         rim_shear, rim_touching = np.zeros((len(rims), 3)), np.zeros(len(rims), bool)
         _carry(self._rims, self._rim_shear, self._rim_touching, rims, rim_shear, rim_touching)
         self._pairs, self._shear, self._touching = pairs, shear, touching
@@ -359,14 +360,16 @@ class DEM:
         raise ComputationError(
             f"the motion runs away at step {self.steps}: grain {self._order[worst]} moves at {speed[worst]:.3g} m/s, "
             f"over {_RUNAWAY} of the smallest radius in one step. A start with deep overlaps, a wall that is too fast "
-            "or forces applied from outside that grow do this; so does a step near the critical one"
+            "or forces applied from outside that grow do this; so does a step near the critical one. Grains that are "
+            "fast for their stiffness need a larger young, or a smaller step"
         )
 
     def apply(self, forces: np.ndarray) -> None:
         """Forces on the grains from outside, (n, 3) by id, until changed [N]."""
-        self._applied = np.ascontiguousarray(np.asarray(forces, float)[self._order])
-        if self._applied.shape != (len(self), 3) or not np.isfinite(self._applied).all():
-            raise InputError(f"forces must be ({len(self)}, 3) finite numbers")
+        forces = np.asarray(forces, float)
+        if forces.shape != (len(self), 3) or not np.isfinite(forces).all():
+            raise InputError(f"forces must be ({len(self)}, 3) finite numbers, one row per grain")
+        self._applied = np.ascontiguousarray(forces[self._order])
 
     @property
     def applied(self) -> np.ndarray:
@@ -435,7 +438,7 @@ class DEM:
         distance = np.sqrt((branch**2).sum(axis=1))
         normals = branch / distance[:, None]
         overlaps = r[i] + r[j] - distance
-        forces = self._shear[held] - (self._stiffness[held] * overlaps)[:, None] * normals
+        forces = _across(self._shear[held], normals) - (self._stiffness[held] * overlaps)[:, None] * normals
         points = x[i] + (r[i] - 0.5 * overlaps)[:, None] * normals
 
         walled = np.flatnonzero(self._rim_overlaps() > 0.0)
@@ -443,7 +446,8 @@ class DEM:
         wall_normals = np.zeros((len(walled), 3))
         wall_normals[np.arange(len(walled)), w // 2] = np.where(w % 2 == 1, 1.0, -1.0)
         wall_overlaps = self._rim_overlaps()[walled]
-        wall_forces = self._rim_shear[walled] - (self._rim_stiffness[walled] * wall_overlaps)[:, None] * wall_normals
+        wall_forces = _across(self._rim_shear[walled], wall_normals)
+        wall_forces -= (self._rim_stiffness[walled] * wall_overlaps)[:, None] * wall_normals
         wall_points = x[k] + (r[k] - wall_overlaps)[:, None] * wall_normals
         return Contacts(
             np.concatenate(
@@ -552,6 +556,11 @@ class DEM:
 def _check(value: object, name: str, what: str, holds) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or not holds(value):
         raise InputError(f"{name} must be {what}, not {value!r}")
+
+
+def _across(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Tangential forces, known in the plane of a step ago, in the plane of now."""
+    return vectors - (vectors * normals).sum(axis=1)[:, None] * normals
 
 
 def _check_grains(packing: Packing) -> None:

@@ -1,0 +1,232 @@
+"""State of a DEM on disk: a run that is loaded goes on to the last bit as if it had never been stopped.
+
+A checkpoint is one .npz file: `header`, JSON text with the format, its version and all single values, and an array for
+each of `_ARRAYS`, in the inside numbering that `order` turns into ids. Nothing in it is pickled.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import asdict
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from porefv import __version__
+from porefv.dem.assembly import _RUNAWAY, DEM, Material, Plate
+from porefv.errors import ComputationError, InputError
+from porefv.io.atomic import atomic_write
+
+FORMAT, VERSION = "porefv.dem", 1
+
+# What a DEM holds between two runs, by attribute. Shapes: n grains, p pairs, k rims, s threads.
+_NUMBERS = {
+    "damping": float, "step": float, "time": float, "_slack": float, "_applied_work": float,
+    "steps": int, "threads": int,
+}  # fmt: skip
+_ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
+    "gravity": ("f8", (3,)),
+    "places": ("f8", (6,)),
+    "wall_velocities": ("f8", (6, 3)),
+    "_order": ("i8", ("n",)),
+    "_rank": ("i8", ("n",)),
+    "_state": ("f8", ("n", 10)),
+    "_applied": ("f8", ("n", 3)),
+    "_inverse_mass": ("f8", ("n",)),
+    "_inverse_inertia": ("f8", ("n",)),
+    "_wall_forces": ("f8", (6, 3)),
+    "_targets": ("f8", (6,)),
+    "_top_speeds": ("f8", (6,)),
+    "_wall_friction": ("f8", (6,)),
+    "_pairs": ("i4", ("p", 2)),
+    "_starts": ("i8", ("n + 1",)),
+    "_others": ("i4", ("p",)),
+    "_shares": ("i8", ("s + 1",)),
+    "_stiffness": ("f8", ("p",)),
+    "_shear": ("f8", ("p", 3)),
+    "_touching": ("?", ("p",)),
+    "_rims": ("i4", ("k", 2)),
+    "_rim_shares": ("i8", ("s + 1",)),
+    "_rim_stiffness": ("f8", ("k",)),
+    "_rim_shear": ("f8", ("k", 3)),
+    "_rim_touching": ("?", ("k",)),
+    "_start": ("f8", ("n", 3)),
+    "_wall_start": ("f8", (6,)),
+    "_work": ("f8", (3,)),
+}
+# Zero between two runs, and made anew.
+_LOADS = ("_loads", "_wall_loads")
+
+# Every attribute of a DEM; tests compare it with what there is.
+ATTRIBUTES = frozenset(("material", "plates", *_NUMBERS, *_ARRAYS, *_LOADS))
+
+
+def save(dem: DEM, path: str | PathLike[str]) -> None:
+    """Write the state; a file that exists is replaced, when the new one is complete.
+
+    Parameters
+    ----------
+    dem : DEM
+    path : path
+        File to write, as it is called: no extension is added.
+
+    Raises
+    ------
+    ComputationError
+        If the motion runs away: it is not put in place of a state that was good.
+    InputError
+        If the file cannot be written.
+    """
+    _refuse_runaway(dem, path)
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "porefv": __version__,
+        "material": asdict(dem.material),
+        "plates": {
+            name: asdict(plate) | {"velocity": [float(v) for v in plate.velocity]} for name, plate in dem.plates.items()
+        },
+        "numbers": {_key(name): kind(getattr(dem, name)) for name, kind in _NUMBERS.items()},
+    }
+    arrays: dict[str, Any] = {_key(name): getattr(dem, name) for name in _ARRAYS}
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, header=np.array(json.dumps(header)), **arrays)
+
+
+def load(path: str | PathLike[str]) -> DEM:
+    """The DEM that was saved, with the number of threads it was saved with.
+
+    Going on is exact, to the last bit, with the same porefv and numba on the same kind of processor.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is damaged, of another program, or of a newer format.
+    """
+    content = _read(path)
+    try:
+        header = json.loads(str(content["header"]))
+        if header["format"] != FORMAT:
+            raise ValueError(f"its format is {header['format']!r}")
+        version = int(header["version"])
+        if version <= VERSION:
+            return _build(header, content)
+    except (KeyError, TypeError, ValueError) as error:
+        raise _unreadable(path, f"{error} is missing" if isinstance(error, KeyError) else str(error)) from None
+    raise InputError(
+        f"{path} has format {version}, written by porefv {header.get('porefv', '(unknown)')}; this one, porefv "
+        f"{__version__}, reads formats to {VERSION}. Install the newer porefv to load it"
+    )
+
+
+def run_saving(dem: DEM, steps: int, path: str | PathLike[str], every: int) -> None:
+    """Take so many steps, and save the state at the start and after every so many.
+
+    Parameters
+    ----------
+    dem : DEM
+    steps : int
+    path : path
+        Checkpoint, replaced each time.
+    every : int
+        Steps between two checkpoints.
+
+    Raises
+    ------
+    ComputationError
+        If the motion runs away. The checkpoint then holds the last state saved before; the message says which.
+    KeyboardInterrupt
+        When interrupted, likewise. `dem` may have moved without counting its last steps: go on from the checkpoint.
+    InputError
+        If the checkpoint cannot be written (before the first step, where possible), or steps are not whole numbers.
+    """
+    for name, value, least in (("steps", steps, 0), ("every", every, 1)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InputError(f"{name} must be a whole number, {least} or more, not {value!r}")
+    save(dem, path)
+    saved, end = dem.steps, dem.steps + steps
+    try:
+        while dem.steps < end:
+            dem.run(min(every, end - dem.steps))
+            save(dem, path)
+            saved = dem.steps
+    except ComputationError as error:
+        raise ComputationError(f"{error}. Last good state, step {saved}, in {path}") from error
+    except KeyboardInterrupt:
+        # The file knows better which state it holds, if the interrupt came while it was written.
+        raise KeyboardInterrupt(f"interrupted. Last good state, step {load(path).steps}, in {path}") from None
+
+
+def _key(attribute: str) -> str:
+    """Name in the file."""
+    return attribute.lstrip("_")
+
+
+def _refuse_runaway(dem: DEM, path: str | PathLike[str]) -> None:
+    state = dem._state
+    speeds = np.sqrt((state[:, 4:7] ** 2).sum(axis=1))
+    good = np.isfinite(state).all(axis=1) & (speeds <= _RUNAWAY * state[:, 3].min() / dem.step)
+    if not good.all():
+        worst = int(np.argmin(good))
+        raise ComputationError(
+            f"the motion runs away at step {dem.steps}: grain {dem._order[worst]} moves at {speeds[worst]:.3g} m/s. "
+            f"Such a state is not saved; {path} is as it was"
+        )
+
+
+def _read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
+    """Everything in the file, whose checksums hold."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            damaged = archive.testzip()
+        if damaged is not None:
+            raise zipfile.BadZipFile(f"{damaged} is damaged")
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except OSError as error:
+        raise InputError(
+            f"cannot read {path}: {error.strerror or error}. Give a checkpoint that porefv.dem saved"
+        ) from None
+    except MemoryError:
+        raise
+    except Exception as error:  # damage may surface anywhere in zipfile, zlib or numpy
+        raise _unreadable(path, str(error) or type(error).__name__) from None
+
+
+def _unreadable(path: str | PathLike[str], reason: str) -> InputError:
+    return InputError(
+        f"{path} is not a checkpoint of porefv.dem, or it is damaged ({reason}). Give another checkpoint, or start the "
+        "run anew"
+    )
+
+
+def _build(header: dict[str, Any], content: dict[str, np.ndarray]) -> DEM:
+    """The DEM, past its constructor, which would list pairs anew and forget what contacts hold.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If something is missing, or is not what it should be.
+    """
+    dem = DEM.__new__(DEM)
+    dem.material = Material(**header["material"])
+    dem.plates = {
+        name: Plate(**(plate | {"velocity": tuple(plate["velocity"])})) for name, plate in header["plates"].items()
+    }
+    for name, kind in _NUMBERS.items():
+        setattr(dem, name, kind(header["numbers"][_key(name)]))
+    n = len(content["state"])
+    sizes: dict[str | int, int] = {
+        "n": n, "n + 1": n + 1, "s + 1": dem.threads + 1, "p": len(content["pairs"]), "k": len(content["rims"])
+    }  # fmt: skip
+    for name, (dtype, shape) in _ARRAYS.items():
+        array = content[_key(name)]
+        expected = tuple(sizes.get(size, size) for size in shape)
+        if array.dtype != np.dtype(dtype) or array.shape != expected:
+            raise ValueError(f"{_key(name)} is {array.dtype} {array.shape}, not {np.dtype(dtype)} {expected}")
+        setattr(dem, name, array)
+    dem._loads = np.zeros((dem.threads, n, 6))
+    dem._wall_loads = np.zeros((dem.threads, 6, 4))
+    return dem

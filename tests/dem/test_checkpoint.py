@@ -1,0 +1,300 @@
+"""Checkpoints: a run that was saved goes on as if nothing had happened, and what is no checkpoint says so."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from porefv import Box, ComputationError, InputError, Packing
+from porefv.dem import DEM, Material, Plate, checkpoint
+
+PACKINGS = Path(__file__).parents[2] / "data" / "packings"
+
+
+def assembly(name="n200_s1", threads=1):
+    """Everything at once: friction, plates that move, shear and press, gravity, damping, forces from outside."""
+    rng = np.random.default_rng(0)
+    dem = DEM(
+        Packing.read(PACKINGS / f"{name}.csv"),
+        Material(young=1e7, stiffness_ratio=0.6, friction_angle=25.0, density=2500.0),
+        {
+            "x_min": Plate(velocity=(0.01, 0.3, 0.0), friction_angle=20.0),
+            "x_max": Plate(stress=500.0, top_speed=0.2, velocity=(0.0, -0.1, 0.0), friction_angle=15.0),
+            "z_max": Plate(stress=2000.0, top_speed=0.5),
+        },
+        gravity=(0.1, 0.0, -9.81),
+        damping=0.05,
+        threads=threads,
+    )
+    dem.velocities = rng.normal(scale=0.3, size=(len(dem), 3))
+    dem.spins = rng.normal(size=(len(dem), 3))
+    dem.apply(rng.normal(scale=5.0, size=(len(dem), 3)))
+    return dem
+
+
+def differences(one, other):
+    """Names of attributes that differ in type, layout or the last bit."""
+    found = []
+    for name in sorted(vars(one).keys() | vars(other).keys()):
+        a, b = vars(one).get(name), vars(other).get(name)
+        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+            same = (a.dtype, a.shape, a.flags.c_contiguous) == (b.dtype, b.shape, b.flags.c_contiguous)
+            same = same and b.flags.writeable and a.tobytes() == b.tobytes()
+        else:
+            same = type(a) is type(b) and a == b
+        if not same:
+            found.append(name)
+    return found
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """A small checkpoint, and its DEM."""
+    dem = assembly("sc8")
+    dem.run(100)
+    path = tmp_path / "state.npz"
+    checkpoint.save(dem, path)
+    return dem, path
+
+
+# ---- exact resume ----------
+
+
+def test_every_attribute_of_a_dem_is_known():
+    # A new attribute: add it to the tables of checkpoint.py, and raise VERSION.
+    assert set(vars(assembly("sc8"))) == checkpoint.ATTRIBUTES
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(threads, tmp_path):
+    dem = assembly(threads=threads)
+    dem.run(300)
+    assert dem._shear.any() and dem._rim_shear.any()  # there is something to forget
+    assert not np.array_equal(dem._state[:, :3], dem._start)  # and a list of pairs that is not fresh
+    checkpoint.save(dem, tmp_path / "state.npz")
+    again = checkpoint.load(tmp_path / "state.npz")
+    assert again.threads == threads
+    assert differences(dem, again) == []
+    listed = dem._start
+    dem.run(500)
+    again.run(500)
+    assert not np.array_equal(dem._start, listed)  # pairs were listed anew on the way
+    assert differences(dem, again) == []
+    assert again.energies == dem.energies
+    assert (again.steps, again.time) == (800, dem.time)
+
+
+def test_saving_changes_nothing(tmp_path):
+    dem, undisturbed = assembly("sc8"), assembly("sc8")
+    for one in (dem, undisturbed):
+        one.run(50)
+    checkpoint.save(dem, tmp_path / "state.npz")
+    assert differences(dem, undisturbed) == []
+
+
+def test_a_loaded_dem_is_a_dem_like_any_other(saved):
+    dem, path = saved
+    again = checkpoint.load(path)
+    for one in (dem, again):
+        one.set_plates({"y_max": Plate(velocity=(0.0, -0.01, 0.0))})
+        one.set_material(Material(young=0.8e7, friction_angle=10.0))
+        one.scale_radii(1.001)
+        one.apply(np.ones((len(one), 3)))
+        one.run(100)
+    assert differences(dem, again) == []
+    assert repr(again) == repr(dem)
+
+
+def test_plates_may_be_given_velocities_of_any_kind(tmp_path):
+    dem = assembly("sc8")
+    dem.set_plates({"x_min": Plate(velocity=np.array([0.1, 0.2, 0.3], np.float32)), "y_min": Plate(velocity=[0, 1, 2])})
+    checkpoint.save(dem, tmp_path / "state.npz")
+    again = checkpoint.load(tmp_path / "state.npz")
+    assert np.array_equal(again.wall_velocities, dem.wall_velocities)
+    assert again.plates["y_min"] == Plate(velocity=(0.0, 1.0, 2.0))
+
+
+def test_the_file_is_named_as_asked_and_opens_without_pickle(tmp_path):
+    dem = assembly("sc8")
+    checkpoint.save(dem, tmp_path / "state")
+    assert [path.name for path in tmp_path.iterdir()] == ["state"]
+    with np.load(tmp_path / "state", allow_pickle=False) as file:
+        assert np.array_equal(file["state"][:, :3], dem.positions[file["order"]])
+        assert json.loads(str(file["header"]))["version"] == checkpoint.VERSION
+
+
+def test_a_checkpoint_that_cannot_be_completed_leaves_the_one_before(saved, monkeypatch):
+    dem, path = saved
+    before = path.read_bytes()
+
+    def full(file, **arrays):
+        file.write(b"PK")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(InputError, match=r"cannot write .*state\.npz.*No space left"):
+        checkpoint.save(dem, path)
+    assert path.read_bytes() == before
+    assert list(path.parent.iterdir()) == [path]
+
+
+# ---- what is no checkpoint ----------
+
+
+def test_a_truncated_file_is_refused(saved, tmp_path):
+    _, path = saved
+    content = path.read_bytes()
+    for length in (0, 1, 100, len(content) // 2, len(content) - 1):
+        cut = tmp_path / "cut.npz"
+        cut.write_bytes(content[:length])
+        with pytest.raises(InputError, match=r"cut\.npz is not a checkpoint .* or it is damaged .*start the run anew"):
+            checkpoint.load(cut)
+
+
+def test_no_flipped_bit_goes_unnoticed(saved, tmp_path):
+    dem, path = saved
+    content = bytearray(path.read_bytes())
+    rng = np.random.default_rng(0)
+    refused = 0
+    # Everywhere, and in the archive's directory at the end in particular.
+    for place in np.concatenate([rng.integers(0, len(content), 200), len(content) - rng.integers(1, 1500, 200)]):
+        flipped = content.copy()
+        flipped[place] ^= 1 << rng.integers(8)
+        (tmp_path / "flipped.npz").write_bytes(flipped)
+        try:
+            again = checkpoint.load(tmp_path / "flipped.npz")
+        except InputError as error:
+            assert "flipped.npz" in str(error)
+            refused += 1
+        else:  # a date, or another thing without a meaning here
+            assert differences(dem, again) == []
+    assert refused > 100
+
+
+def test_foreign_files_are_refused(tmp_path):
+    path = tmp_path / "other.npz"
+    writers = [
+        lambda: path.write_text("x,y,z,radius\n"),
+        lambda: np.savez(path, state=np.zeros((3, 10))),
+        lambda: np.savez(path, header=np.array(json.dumps({"format": "another", "version": 1}))),
+        lambda: np.savez(path, header=np.array("[]")),
+        lambda: np.savez(path, header=np.array(["{}", None], object)),
+        lambda: np.save(path.open("wb"), np.zeros(3)),
+    ]
+    for write in writers:
+        write()
+        with pytest.raises(InputError, match=r"other\.npz is not a checkpoint of porefv\.dem"):
+            checkpoint.load(path)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"cannot read .*missing\.npz: No such file"):
+        checkpoint.load(tmp_path / "missing.npz")
+    with pytest.raises(InputError, match="cannot read"):
+        checkpoint.load(tmp_path)
+
+
+def rewritten(path, change):
+    """The checkpoint with another header or arrays, checksums right."""
+    with np.load(path) as file:
+        content = dict(file)
+    header = json.loads(str(content["header"]))
+    change(header, content)
+    content["header"] = np.array(json.dumps(header))
+    np.savez(path, **content)
+
+
+def test_a_newer_format_says_so(saved):
+    _, path = saved
+
+    def newer(header, content):
+        header.update(version=checkpoint.VERSION + 1, porefv="9.9")
+        content.clear()
+
+    rewritten(path, newer)
+    with pytest.raises(InputError, match=r"state\.npz has format 2, written by porefv 9\.9.*Install the newer porefv"):
+        checkpoint.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda header, content: content.pop("shear"), "'shear' is missing"),
+        (lambda header, content: content.update(shear=np.zeros((1, 3))), "shear is float64"),
+        (lambda header, content: content.update(others=content["others"].astype(np.int64)), "others is int64"),
+        (lambda header, content: header["numbers"].pop("time"), "'time' is missing"),
+        (lambda header, content: header["numbers"].update(threads=5), "shares is int64"),
+        (lambda header, content: header["material"].update(colour="red"), "colour"),
+        (lambda header, content: header["material"].update(young=-1.0), "young"),
+    ],
+)
+def test_content_that_does_not_fit_together_is_refused(saved, change, reason):
+    _, path = saved
+    rewritten(path, change)
+    with pytest.raises(InputError, match=rf"state\.npz is not a checkpoint .*{reason}"):
+        checkpoint.load(path)
+
+
+# ---- saving on the way ----------
+
+
+def test_a_run_in_chunks_is_the_run(tmp_path):
+    # Only the work of applied forces is added up by chunks.
+    dem, whole = assembly(), assembly()
+    checkpoint.run_saving(dem, 500, tmp_path / "state.npz", every=130)
+    whole.run(500)
+    assert set(differences(dem, whole)) <= {"_applied_work", "time"}
+    np.testing.assert_allclose(dem.energies.applied, whole.energies.applied, rtol=1e-10)
+    assert differences(dem, checkpoint.load(tmp_path / "state.npz")) == []
+
+
+def test_a_runaway_leaves_the_last_good_state(tmp_path):
+    dem = DEM(Packing([[0, 0, 0], [0, 0, 1]], [0.1, 0.1], Box([-9, -9, -9], [9, 9, 9])))
+    path = tmp_path / "state.npz"
+    # A tenth of the radius in one step after 100 of them, still far from the wall.
+    pull = 1e-3 * dem.radii[1] * dem.masses[1] / dem.step**2
+    dem.apply([[0, 0, 0], [0, 0, pull]])
+    with pytest.raises(ComputationError, match=r"runs away at step \d+.* Last good state, step 80, in .*state\.npz"):
+        checkpoint.run_saving(dem, 10_000, path, every=40)
+    good = checkpoint.load(path)
+    assert good.steps == 80 < dem.steps <= 120
+    good.run(dem.steps - 81)  # it was good to the step before
+    # The runaway itself is not put in its place.
+    before = path.read_bytes()
+    with pytest.raises(ComputationError, match=r"grain 1 moves at .* not saved; .*state\.npz is as it was"):
+        checkpoint.run_saving(dem, 10, path, every=5)
+    assert path.read_bytes() == before
+
+
+def test_an_interrupt_leaves_the_last_good_state(tmp_path, monkeypatch):
+    dem, path = assembly("sc8"), tmp_path / "state.npz"
+    run = dem.run
+
+    def interrupted(steps):
+        run(steps)
+        if dem.steps == 30:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(dem, "run", interrupted, raising=False)
+    with pytest.raises(KeyboardInterrupt, match=r"Last good state, step 20, in .*state\.npz"):
+        checkpoint.run_saving(dem, 100, path, every=10)
+    again, reference = checkpoint.load(path), assembly("sc8")
+    again.run(10)
+    for _ in range(3):
+        reference.run(10)
+    assert differences(again, reference) == []
+
+
+def test_a_checkpoint_that_cannot_be_written_stops_the_run_before_it_starts(tmp_path):
+    dem = assembly("sc8")
+    with pytest.raises(InputError, match="cannot write"):
+        checkpoint.run_saving(dem, 10, tmp_path / "missing" / "state.npz", every=5)
+    assert dem.steps == 0
+
+
+@pytest.mark.parametrize(("steps", "every", "name"), [(-1, 5, "steps"), (10, 0, "every"), (10, 2.5, "every")])
+def test_steps_must_be_whole_numbers(tmp_path, steps, every, name):
+    with pytest.raises(InputError, match=f"{name} must be a whole number"):
+        checkpoint.run_saving(assembly("sc8"), steps, tmp_path / "state.npz", every=every)
+    assert list(tmp_path.iterdir()) == []
