@@ -3,6 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from porefv.boundary import Walls
+from porefv.cells import polyhedron_volumes
 from porefv.errors import InputError
 from porefv.mesh import PoreMesh
 from porefv.packing import Box, Packing
@@ -195,3 +196,46 @@ def test_repr_tells_what_is_inside(mesh_of):
     assert repr(mesh_of("n25_s1")) == "PoreMesh(25 spheres, 122 pores, 240 throats, box 1×1×1 m)"
     assert repr(mesh_of("n25_s1").throats) == "Throats(240 throats between 122 pores)"
     assert repr(mesh_of("n25_s1").triangulation) == "RegularTriangulation(25 spheres, 122 cells)"
+
+
+# ---- rates of volume ----------
+
+
+def moved(mesh, velocities, speeds, h):
+    """Volumes of the cells after a time h at fixed topology."""
+    n = mesh.n_spheres
+    points, sizes = mesh.local_points.copy(), mesh.sizes.copy()
+    points[:n] += h * velocities
+    sizes[n:] += h * speeds
+    return polyhedron_volumes(mesh.cells, n, points, sizes)
+
+
+@pytest.mark.parametrize("name", ["n25_s1", "n200_s1", "sc8"])
+def test_rates_of_volume_are_the_derivative_of_the_volumes(mesh_of, name):
+    mesh = mesh_of(name)
+    rng = np.random.default_rng(0)
+    velocities, speeds = rng.normal(size=(mesh.n_spheres, 3)), rng.normal(size=6)
+    rates = mesh.cell_volume_rates(velocities, speeds)
+    h = 1e-6
+    differences = (moved(mesh, velocities, speeds, h) - moved(mesh, velocities, speeds, -h)) / (2 * h)
+    assert_allclose(rates, differences, rtol=0, atol=1e-8 * np.abs(rates).max())
+    # What the cells gain together is what the walls clear.
+    cleared = sum((speeds[2 * a] + speeds[2 * a + 1]) * mesh.box.section(a) for a in range(3))
+    assert_allclose(rates.sum(), cleared, rtol=1e-12)
+
+
+def test_grains_and_walls_that_move_as_one_change_no_volume(mesh_of):
+    mesh = mesh_of("n200_s1")
+    velocity = np.array([1.0, -2.0, 0.5])
+    speeds = np.stack([-velocity, velocity], axis=1).ravel()
+    rates = mesh.cell_volume_rates(np.tile(velocity, (mesh.n_spheres, 1)), speeds)
+    assert_allclose(rates, 0.0, atol=1e-14)
+
+
+def test_uniform_strain_changes_every_volume_alike(mesh_of):
+    mesh = mesh_of("n200_s1")
+    strain = np.array([0.1, -0.3, 0.05])
+    middle = 0.5 * (mesh.box.lower + mesh.box.upper)
+    speeds = np.repeat(0.5 * strain * mesh.box.size, 2)
+    rates = mesh.cell_volume_rates(strain * (mesh.packing.centres - middle), speeds)
+    assert_allclose(rates, strain.sum() * mesh.cell_volumes, rtol=1e-10, atol=1e-18)

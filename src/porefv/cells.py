@@ -6,9 +6,11 @@ import numpy as np
 from numba import njit, prange
 
 from porefv.facets import (
+    _at,
     _cross,
     _dot,
     _height,
+    _minus,
     _overlaps,
     _plane_distances,
     _towards,
@@ -58,6 +60,81 @@ def polyhedron_volumes(cells, n, points, sizes):
             for i in range(1, 4):
                 volumes[t] *= _height(s[0], s[i], points, sizes)
     return volumes
+
+
+@njit(cache=True, parallel=True)
+def volume_rates(cells, n, points, sizes, velocities, speeds):
+    """Rate of the volume of each cell: the exact derivative of `polyhedron_volumes`, linear in the velocities.
+
+    velocities (n, 3) are those of the spheres' centres, speeds (6,) those of the walls along their outward normals.
+    """
+    rates = np.empty(cells.shape[0])
+    for t in prange(cells.shape[0]):
+        s = np.empty(4, np.int32)  # spheres first
+        ns = 0
+        for i in range(4):
+            if cells[t, i] < n:
+                s[ns] = cells[t, i]
+                ns += 1
+        nw = ns
+        for i in range(4):
+            if cells[t, i] >= n:
+                s[nw] = cells[t, i]
+                nw += 1
+        a = s[0]
+        if ns == 4:
+            u = _towards(a, s[1], n, points)
+            v = _towards(a, s[2], n, points)
+            w = _towards(a, s[3], n, points)
+            du = _minus(_at(s[1], velocities), _at(a, velocities))
+            dv = _minus(_at(s[2], velocities), _at(a, velocities))
+            dw = _minus(_at(s[3], velocities), _at(a, velocities))
+            sense = 1.0 if _dot(_cross(u, v), w) > 0.0 else -1.0
+            rate = _dot(_cross(v, w), du) + _dot(_cross(w, u), dv) + _dot(_cross(u, v), dw)
+            rates[t] = sense * rate / 6.0
+        elif ns == 3:
+            d = _at(s[3], points)
+            u = _towards(a, s[1], n, points)
+            v = _towards(a, s[2], n, points)
+            du = _minus(_at(s[1], velocities), _at(a, velocities))
+            dv = _minus(_at(s[2], velocities), _at(a, velocities))
+            base = 0.5 * _dot(_cross(u, v), d)
+            base_rate = 0.5 * (_dot(_cross(du, v), d) + _dot(_cross(u, dv), d))
+            height = 0.0
+            height_rate = 0.0
+            for i in range(3):
+                height += _height(s[i], s[3], points, sizes)
+                height_rate += speeds[s[3] - n] - _dot(_at(s[i], velocities), d)
+            sense = 1.0 if base > 0.0 else -1.0
+            rates[t] = sense * (base_rate * height + base * height_rate) / 3.0
+        elif ns == 2:
+            b = s[1]
+            d1 = _at(s[2], points)
+            d2 = _at(s[3], points)
+            edge = _cross(d1, d2)
+            u = _dot(_towards(a, b, n, points), edge)
+            du = _dot(_minus(_at(b, velocities), _at(a, velocities)), edge)
+            a0 = _height(a, s[2], points, sizes)
+            a1 = _height(b, s[2], points, sizes)
+            b0 = _height(a, s[3], points, sizes)
+            b1 = _height(b, s[3], points, sizes)
+            da0 = speeds[s[2] - n] - _dot(_at(a, velocities), d1)
+            da1 = speeds[s[2] - n] - _dot(_at(b, velocities), d1)
+            db0 = speeds[s[3] - n] - _dot(_at(a, velocities), d2)
+            db1 = speeds[s[3] - n] - _dot(_at(b, velocities), d2)
+            section = 2.0 * a0 * b0 + 2.0 * a1 * b1 + a0 * b1 + a1 * b0
+            section_rate = 2.0 * (da0 * b0 + a0 * db0 + da1 * b1 + a1 * db1) + da0 * b1 + a0 * db1 + da1 * b0 + a1 * db0
+            sense = 1.0 if u > 0.0 else -1.0
+            rates[t] = sense * (du * section + u * section_rate) / 6.0
+        else:
+            rates[t] = 0.0
+            for i in range(1, 4):
+                rate = speeds[s[i] - n] - _dot(_at(a, velocities), _at(s[i], points))
+                for j in range(1, 4):
+                    if j != i:
+                        rate *= _height(a, s[j], points, sizes)
+                rates[t] += rate
+    return rates
 
 
 @njit(cache=True, parallel=True)

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 # Contacts in a block, and where each quantity's column starts in it: given ...
-_SIZE = 128
+_SIZE = 64
 _BRANCH = 0 * _SIZE  # from i to j, three columns
 _RADIUS = 3 * _SIZE  # of i
 _REACH = 4 * _SIZE  # r_i + r_j
