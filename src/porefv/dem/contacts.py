@@ -52,15 +52,16 @@ def grain_contacts(first, last, state, starts, others, stiffness, ratio, frictio
     """
     frictional = ratio > 0.0 and friction > 0.0
     block = np.empty(_COLUMNS)
+    for k in range(_SIZE):
+        block[_FRICTION + k] = friction
     pair = np.empty(_SIZE, np.int64)
     grain = np.empty(_SIZE, np.int64)
     dissipated = 0.0
     m = 0
     for i in range(first, last):
-        x = state[i, 0]
-        y = state[i, 1]
-        z = state[i, 2]
-        r = state[i, 3]
+        x, y, z, r = state[i, 0], state[i, 1], state[i, 2], state[i, 3]
+        vx, vy, vz = state[i, 4], state[i, 5], state[i, 6]
+        wx, wy, wz = state[i, 7], state[i, 8], state[i, 9]
         for c in range(starts[i], starts[i + 1]):
             j = others[c]
             dx = state[j, 0] - x
@@ -91,14 +92,17 @@ def grain_contacts(first, last, state, starts, others, stiffness, ratio, frictio
             block[_BRANCH + 2 * _SIZE + m] = dz
             block[_RADIUS + m] = r
             block[_REACH + m] = reach
+            block[_MOTION + m] = state[j, 4] - vx
+            block[_MOTION + _SIZE + m] = state[j, 5] - vy
+            block[_MOTION + 2 * _SIZE + m] = state[j, 6] - vz
+            block[_SPIN_I + m] = wx
+            block[_SPIN_I + _SIZE + m] = wy
+            block[_SPIN_I + 2 * _SIZE + m] = wz
             for a in range(3):
-                block[_MOTION + a * _SIZE + m] = state[j, 4 + a] - state[i, 4 + a]
-                block[_SPIN_I + a * _SIZE + m] = state[i, 7 + a]
                 block[_SPIN_J + a * _SIZE + m] = state[j, 7 + a]
                 block[_SHEAR + a * _SIZE + m] = shear[c, a]
             block[_NORMAL_STIFFNESS + m] = stiffness[c]
             block[_SHEAR_STIFFNESS + m] = ratio * stiffness[c]
-            block[_FRICTION + m] = friction
             m += 1
             if m == _SIZE:
                 _contact_law(m, dt, block)

@@ -69,17 +69,30 @@ def advance(
                 bounds[s], bounds[s + 1], dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping,
                 start, fastest,
             )  # fmt: skip
-        work[0] += sliding.sum()
-        work[2] += damped.sum()
-        walls = 0.0
-        for w in range(6):
-            walls = max(walls, abs(places[w] - wall_start[w]))
-        if runaway.any():
-            return step + 1, RUNAWAY
-        # A pair closes by what both its ends have moved.
-        if np.sqrt(far.max()) + max(walls, np.sqrt(far.max())) > slack:
-            return step + 1, CROWDED
+        reason = _look(sliding, damped, far, runaway, places, wall_start, slack, work)
+        if reason != DONE:
+            return step + 1, reason
     return steps, DONE
+
+
+@njit(cache=True, nogil=True)
+def _look(sliding, damped, far, runaway, places, wall_start, slack, work):
+    """Add up what the shares have found; whether to go on."""
+    farthest = 0.0
+    lost = False
+    for s in range(far.shape[0]):
+        work[0] += sliding[s]
+        work[2] += damped[s]
+        farthest = max(farthest, far[s])
+        lost = lost or runaway[s]
+    if lost:
+        return RUNAWAY
+    farthest = np.sqrt(farthest)
+    walls = 0.0
+    for w in range(6):
+        walls = max(walls, abs(places[w] - wall_start[w]))
+    # A pair closes by what both its ends have moved.
+    return CROWDED if farthest + max(walls, farthest) > slack else DONE
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
