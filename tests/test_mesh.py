@@ -239,3 +239,28 @@ def test_uniform_strain_changes_every_volume_alike(mesh_of):
     speeds = np.repeat(0.5 * strain * mesh.box.size, 2)
     rates = mesh.cell_volume_rates(strain * (mesh.packing.centres - middle), speeds)
     assert_allclose(rates, strain.sum() * mesh.cell_volumes, rtol=1e-10, atol=1e-18)
+
+
+# ---- Laguerre cells ----------
+
+
+@pytest.mark.parametrize("name", ["n25_s1", "n200_s1", "n2000_s1"])
+def test_laguerre_cells_fill_the_box_and_hold_their_spheres(mesh_of, name):
+    mesh = mesh_of(name)
+    volumes = mesh.laguerre_volumes
+    assert_allclose(volumes.sum(), mesh.box.volume, rtol=1e-12)
+    assert (volumes > 4.0 / 3.0 * np.pi * mesh.packing.radii**3).all()
+
+
+def test_laguerre_cells_of_a_lattice_are_its_cubes(mesh_of):
+    assert_allclose(mesh_of("sc8").laguerre_volumes, 0.125, rtol=1e-12)
+
+
+def test_laguerre_cells_are_where_the_power_is_least(mesh_of):
+    mesh = mesh_of("n25_s1")
+    tries = 200_000
+    x = mesh.box.lower + np.random.default_rng(0).random((tries, 3)) * mesh.box.size
+    power = ((x[:, None] - mesh.packing.centres) ** 2).sum(axis=2) - mesh.packing.radii**2
+    share = np.bincount(power.argmin(axis=1), minlength=25) / tries
+    expected = mesh.laguerre_volumes / mesh.box.volume
+    assert (np.abs(share - expected) < 4.5 * np.sqrt(expected * (1.0 - expected) / tries)).all()

@@ -404,6 +404,47 @@ def _cut_caps(f, i, j, k, m, u, edge, qi, hi, qj, hj, cross, n, points, sizes, s
     return volume + psi * h * h * (3.0 * r - h) / 6.0
 
 
+@njit(cache=True, error_model="numpy")
+def laguerre_volumes(facet_cells, facet_vertices, vertices, n, points, sizes):
+    """(n,): volume of the Laguerre cell of each sphere.
+
+    The face between spheres k and m is a polygon with a corner P_i for each cell around the edge km. A facet with that
+    edge owns the triangle from P_i to P_j and the face's foot, d from centre k, and a pyramid d h L / 6 under it: h is
+    from the foot to the line of the P's, towards the facet's own side, and all are signed.
+    """
+    volumes = np.zeros(n)
+    for f in range(facet_cells.shape[0]):
+        a = facet_vertices[f, 0]
+        b = facet_vertices[f, 1]
+        c = facet_vertices[f, 2]
+        ab = _towards(a, b, n, points)
+        ac = _towards(a, c, n, points)
+        cross = _cross(ab, ac)
+        twice = np.sqrt(_dot(cross, cross))
+        if twice == 0.0:
+            continue
+        pi = _at(facet_cells[f, 0], vertices)
+        length = _dot(cross, _minus(_at(facet_cells[f, 1], vertices), pi)) / twice
+        for side in range(3):
+            k = a if side != 1 else b
+            m = b if side == 0 else c
+            if k >= n:
+                continue
+            # Along the edge from k to m, in the facet's cyclic sense and unit.
+            edge = _unit(_towards(k, m, n, points))
+            inward = _cross(cross, edge if side != 2 else _times(-1.0, edge))
+            h = _dot(inward, _minus(pi, _at(k, points))) / twice
+            if m >= n:
+                volumes[k] += _height(k, m, points, sizes) * h * length / 6.0
+                continue
+            u = _towards(k, m, n, points)
+            square = _dot(u, u)
+            d = 0.5 * (square + (sizes[k] - sizes[m]) * (sizes[k] + sizes[m])) / np.sqrt(square)
+            volumes[k] += d * h * length / 6.0
+            volumes[m] += (np.sqrt(square) - d) * h * length / 6.0
+    return volumes
+
+
 @njit(cache=True, parallel=True)
 def row_sums(values):
     """(f,): sum of the three values of each row."""

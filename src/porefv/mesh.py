@@ -11,7 +11,7 @@ import numpy as np
 from porefv import memory
 from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_rates
 from porefv.errors import InputError
-from porefv.facets import enumerate_facets, unite
+from porefv.facets import enumerate_facets, laguerre_volumes, unite
 from porefv.packing import Box, Packing
 from porefv.tessellation import RegularTriangulation
 from porefv.tessellation.triangulation import wall_normals
@@ -216,6 +216,16 @@ class PoreMesh:
     def pore_volumes(self) -> np.ndarray:
         """(n_pores,): void volume of each pore [m³]."""
         return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
+
+    @cached_property
+    def laguerre_volumes(self) -> np.ndarray:
+        """(n,): volume of each sphere's Laguerre cell, all that is nearer to it, in power, than to others [m³].
+
+        They fill the box: each sphere with its share of the void.
+        """
+        return laguerre_volumes(
+            self.facet_cells, self.facet_vertices, self.local_vertices, self.n_spheres, self.local_points, self.sizes
+        )
 
     @cached_property
     def wall_faces(self) -> WallFaces:
