@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from porefv import Box, InputError, Packing
+from porefv import Box, ComputationError, InputError, Packing
 from porefv.dem import DEM, Material, Plate
 
 E = 1.0e6
@@ -299,8 +299,6 @@ def test_materials_out_of_range_are_refused(name, value):
 
 
 def test_runaway_motion_is_stopped_and_says_which_grain():
-    from porefv import ComputationError
-
     dem = grains([[0, 0, 0], [1, 0, 0]], [0.1, 0.1], material=SMOOTH)
     dem.velocities = [[0, 0, 0], [1e5, 0, 0]]
     with pytest.raises(ComputationError, match="grain 1 moves at"):
@@ -309,6 +307,30 @@ def test_runaway_motion_is_stopped_and_says_which_grain():
     dem.velocities = [[np.nan, 0, 0], [0, 0, 0]]
     with pytest.raises(ComputationError, match="grain 0"):
         dem.run(10)
+
+
+def test_a_grain_that_is_pushed_through_a_wall_stops_the_run():
+    dem = DEM(Packing([[0, 0, 0.1]], [0.1], Box([-1, -1, 0], [1, 1, 1])), SMOOTH, gravity=(0, 0, -1500.0), step=2e-4)
+    with pytest.raises(ComputationError, match="grain 0 has left the box"):
+        dem.run(10_000)
+
+
+def test_a_wall_that_cannot_reach_its_stress_says_what_it_reached():
+    box = Box([0, 0, 0], [0.2, 0.2, 0.2])
+    # One grain of two pressing walls: no rest at two different stresses.
+    plates = {"x_min": Plate(stress=1000.0, top_speed=0.05), "x_max": Plate(stress=3000.0, top_speed=0.05)}
+    dem = DEM(Packing([[0.1, 0.1, 0.1]], [0.1], box), SMOOTH, plates, damping=0.3)
+    with pytest.raises(ComputationError, match=r"wall x_m.. presses with .* Pa, not the .* Pa asked"):
+        dem.run_to_rest(most=2000)
+
+
+def test_grains_that_swing_for_ever_are_not_at_rest():
+    dem = DEM(Packing([[0, 0, 0.095]], [0.1], Box([-1, -1, 0], [1, 1, 1])), SMOOTH, gravity=(0, 0, -10.0))
+    with pytest.raises(ComputationError, match="not at rest"):
+        dem.run_to_rest(most=1000)
+    dem = DEM(Packing([[0, 0, 0.095]], [0.1], Box([-1, -1, 0], [1, 1, 1])), SMOOTH, gravity=(0, 0, -10.0), damping=0.3)
+    assert dem.run_to_rest() < 10_000
+    assert_allclose(dem.wall_stress["z_min"], mass(0.1) * 10.0 / 4.0, rtol=1e-2)
 
 
 # ---- the same on any number of threads ----------

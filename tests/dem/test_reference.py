@@ -16,11 +16,8 @@ YADE_FRICTION = [(1650.0, 1525.93, 3.46946e-5)]  # friction 30°
 def pressed(dem, stress):
     """The height of the sample at rest under a stress on its ends."""
     dem.set_plates({wall: Plate(stress=stress, top_speed=0.02) for wall in ("z_min", "z_max")})
-    for _ in range(100):
-        dem.run(100)
-        if dem.unbalanced < 1e-5 and abs(dem.wall_stress["z_max"] / stress - 1.0) < 1e-4:
-            return float(dem.box.size[2])
-    raise AssertionError("no rest")
+    dem.run_to_rest(unbalanced=1e-5, stress=1e-4, most=10_000)
+    return float(dem.box.size[2])
 
 
 @pytest.fixture

@@ -354,9 +354,57 @@ class DEM:
         if before is not None:
             self._applied_work += float((self._applied * (self._state[:, :3] - before)).sum())
 
+    def run_to_rest(self, unbalanced: float = 1e-3, stress: float = 1e-2, most: int = 200_000) -> int:
+        """Take steps until the grains are at rest and walls press with their stresses; returns how many.
+
+        Parameters
+        ----------
+        unbalanced : float
+            Bound on the mean resultant on a grain, relative to the mean contact force.
+        stress : float
+            Bound on the distance of each pressing wall's stress from its target, relative to it.
+        most : int
+            Steps after which to give up.
+
+        Raises
+        ------
+        ComputationError
+            If there is no rest by then; for a wall that does not reach its stress, with what it reached.
+        """
+        begin = self.steps
+        while self.steps - begin < most:
+            self.run(min(100, most - (self.steps - begin)))
+            if self.unbalanced <= unbalanced and not self._short_of_stress(stress):
+                return self.steps - begin
+        short = self._short_of_stress(stress)
+        if short:
+            walls = self.wall_stress
+            raise ComputationError(
+                f"after {most} steps wall {short} presses with {walls[short]:.4g} Pa, not the "
+                f"{self.plates[short].stress:.4g} Pa asked: are there grains before it that can bear that, and can it "
+                f"reach them at its top speed of {self.plates[short].top_speed:.3g} m/s?"
+            )
+        raise ComputationError(
+            f"after {most} steps the grains are not at rest: the unbalanced force is {self.unbalanced:.2g} of the mean "
+            f"contact force, {unbalanced:.2g} asked. Damping, or friction, is what brings them to rest"
+        )
+
+    def _short_of_stress(self, tolerance: float) -> str | None:
+        """A wall that presses with less or more than it should, by more than a part `tolerance`."""
+        walls = self.wall_stress
+        for name, plate in self.plates.items():
+            if plate.stress is not None and abs(walls[name] - plate.stress) > tolerance * plate.stress:
+                return name
+        return None
+
     def _fail(self) -> None:
         speed = np.sqrt((self._state[:, 4:7] ** 2).sum(axis=1))
         worst = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
+        if np.isinf(speed[worst]):
+            raise ComputationError(
+                f"grain {self._order[worst]} has left the box at step {self.steps}: its centre has passed a wall. "
+                "Walls yield like grains, k = E r: a larger young, a slower wall or less load keeps them apart"
+            )
         raise ComputationError(
             f"the motion runs away at step {self.steps}: grain {self._order[worst]} moves at {speed[worst]:.3g} m/s, "
             f"over {_RUNAWAY} of the smallest radius in one step. A start with deep overlaps, a wall that is too fast "

@@ -137,7 +137,8 @@ def wall_contacts(
     """Forces between grains and walls, rims (m, 2): grain and wall; returns the energy that sliding dissipates.
 
     Wall w is normal to axis w // 2, at places[w] along it, and moves with velocities[w]; wall_loads (6, 4), added to,
-    holds the force on it and the sum of the stiffnesses of its contacts. `friction` (6,) is tan φ.
+    holds the force on it and the sum of the stiffnesses of its contacts. `friction` (6,) is tan φ. A grain whose
+    centre is beyond a wall gets an infinite load, which stops the motion.
     """
     block = np.empty(_COLUMNS)
     pair = np.empty(_SIZE, np.int64)
@@ -149,14 +150,18 @@ def wall_contacts(
         axis = w // 2
         r = state[i, 3]
         ahead = places[w] - state[i, axis]
-        if (ahead if w % 2 == 1 else -ahead) >= r:
+        gap = ahead if w % 2 == 1 else -ahead
+        if gap <= 0.0:  # the centre is beyond the wall: nothing pushes it back
+            loads[i, axis] = np.inf
+            continue
+        if gap >= r:
             if touching[c]:
                 touching[c] = False
                 shear[c, 0] = shear[c, 1] = shear[c, 2] = 0.0
             continue
         touching[c] = True
         if not (ratio > 0.0 and friction[w] > 0.0):
-            push = stiffness[c] * ((r if ahead > 0.0 else -r) - ahead)
+            push = stiffness[c] * (r - gap) * (1.0 if w % 2 == 1 else -1.0)
             loads[i, axis] -= push
             wall_loads[w, axis] += push
             wall_loads[w, 3] += stiffness[c]
