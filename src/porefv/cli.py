@@ -1,4 +1,4 @@
-"""The command `porefv`: solve, check, info, plot. Commands import what they need: help comes at once."""
+"""The command `porefv`: pack, solve, check, info, plot. Commands import what they need: help comes at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from porefv import __version__
 from porefv.errors import PorefvError
@@ -53,12 +53,19 @@ def _fail(message: str, status: int) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="porefv",
-        description="Flow through packings of spheres: permeability, pressures, forces on every grain.",
+        description="Packings of spheres, and flow through them: permeability, pressures, forces on every grain.",
         epilog="A scene says what is wanted, and only that is computed. "
         "Exit status: 0 done, 1 the computation failed, 2 bad input.",
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    pack = commands.add_parser("pack", help="make a packing of spheres, and write its file")
+    pack.add_argument("scene", metavar="SCENE.toml", type=Path)
+    pack.add_argument("--force", action="store_true", help="replace a file that exists")
+    pack.add_argument("--threads", metavar="N", type=_count, help="compute with at most N threads")
+    pack.add_argument("--quiet", action="store_true", help="print errors only")
+    pack.set_defaults(command=_pack)
 
     solve = commands.add_parser("solve", help="compute what a scene asks for, and write its results")
     solve.add_argument("scene", metavar="SCENE.toml", type=Path)
@@ -91,6 +98,20 @@ def _count(text: str) -> int:
 # ---- commands ------------------------------------------------------------------------------------------
 
 
+def _pack(options: argparse.Namespace) -> None:
+    from porefv.dem import motion
+    from porefv.pack_scene import PackProgress, PackScene, outcome
+
+    scene = PackScene.read(options.scene)
+    _limit(options.threads)
+    progress = PackProgress(scene.stages, quiet=options.quiet)
+    if not _compiled(motion.advance):
+        progress.note("compiling for this machine, this once; it takes about half a minute")
+    packing = scene.pack(force=options.force, progress=progress)
+    if not options.quiet:
+        print(outcome(packing, scene.output))
+
+
 def _solve(options: argparse.Namespace) -> None:
     from porefv.progress import Progress
     from porefv.report import outcome
@@ -98,10 +119,7 @@ def _solve(options: argparse.Namespace) -> None:
     from porefv.scene import Scene
 
     scene = Scene.read(options.scene)
-    if options.threads:
-        import numba
-
-        numba.set_num_threads(min(options.threads, numba.get_num_threads()))
+    _limit(options.threads)
     progress = Progress(scene.stages, quiet=options.quiet)
     _announce_compilation(progress)
     directory = scene.solve(force=options.force, progress=progress)
@@ -142,5 +160,19 @@ def _announce_compilation(progress: Progress) -> None:
     """Say what is waited for, where numba has no compiled kernels from an earlier run."""
     from porefv.tessellation import insertion
 
-    if not any(Path(insertion.insert.stats.cache_path or "").glob("insertion.insert-*.nbi")):
+    if not _compiled(insertion.insert):
         progress.note("compiling for this machine, this once; it takes about a minute")
+
+
+def _compiled(kernel: Any) -> bool:
+    """Whether numba has a kernel compiled in an earlier run."""
+    name = f"{kernel.__module__.rpartition('.')[2]}.{kernel.__name__}"
+    return any(Path(kernel.stats.cache_path or "").glob(f"{name}-*.nbi"))
+
+
+def _limit(threads: int | None) -> None:
+    """Compute with at most so many threads."""
+    if threads:
+        import numba
+
+        numba.set_num_threads(min(threads, numba.get_num_threads()))
