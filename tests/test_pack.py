@@ -169,12 +169,13 @@ def test_a_scene_must_say_how_to_pack(scene):
 # ---- progress ----------
 
 
-def test_the_bar_shows_stress_porosity_and_unbalanced_force():
+def test_the_terminal_shows_stress_porosity_and_unbalanced_force():
     progress = PackProgress(("packing", "writing"), quiet=True)
     scene = PackScene.from_mapping(tomllib.loads(GROWTH.replace("number = 50", "number = 30")))
     scene.make(progress)
-    line = progress._line("packing", 1.0)
-    assert re.search(r"1/2 packing  1\.0 s  pressing: stress \S+ Pa, porosity 0\.\d+, unbalanced force \S+$", line)
+    line = progress._line("packing", 100.0)
+    assert re.fullmatch(r"porefv: pressing  100\.0 s  stress \S+ Pa  porosity 0\.\d{4}  unbalanced \S+", line)
+    assert len(line) < 80
 
 
 # ---- examples and documentation ----------

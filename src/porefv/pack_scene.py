@@ -53,19 +53,21 @@ class Settling:
 
 
 class PackProgress(Progress):
-    """Progress that also shows the state of the grains."""
+    """Progress that shows the state of the grains, once there is one, in the place of the bar."""
 
-    detail = ""
+    moment: Moment | None = None
 
     def show(self, moment: Moment) -> None:
-        """Take a moment to be drawn with the bar."""
-        self.detail = (
-            f"  {moment.stage}: stress {moment.stress:.4g} Pa, porosity {moment.porosity:.4f}, "
-            f"unbalanced force {moment.unbalanced:.2g}"
-        )
+        """Take a moment to be drawn."""
+        self.moment = moment
 
     def _line(self, name: str, seconds: float) -> str:
-        return super()._line(name, seconds) + self.detail
+        now = self.moment
+        if now is None:
+            return super()._line(name, seconds)
+        # Not above 80 columns: what is beyond is cut off.
+        state = f"stress {now.stress:.4g} Pa  porosity {now.porosity:.4f}  unbalanced {now.unbalanced:.2g}"
+        return f"porefv: {now.stage}  {seconds:.1f} s  {state}"
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ class PackScene:
         progress = progress or PackProgress(self.stages, quiet=True)
         with progress.stage("packing"):
             packing = self.make(progress)
-        progress.detail = ""
+        progress.moment = None
         with progress.stage("writing"):
             write_packing(packing, self.output)
         return packing

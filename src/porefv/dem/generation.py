@@ -413,7 +413,7 @@ def _lower_friction(dem: DEM, target: float, porosity: float, watch: _Watch) -> 
         )
     waited = 0
     while dem.porosity > porosity:
-        stress = watch.stride("lowering friction")
+        stress = watch.stride("smoothing")
         dem.scale_radii(_correction(dem, stress, target))
         if stress > 0.9 * target:
             # The porosity follows friction only while stress stays what it is to be.
@@ -449,7 +449,7 @@ def _fill(dem: DEM, porosity: float, watch: _Watch) -> None:
 
 def _relax(dem: DEM, unbalanced: float, watch: _Watch) -> None:
     """Run until grains are at rest, pressing on each other or apart."""
-    while watch.stride("coming to rest") > _NO_STRESS * dem.material.young:
+    while watch.stride("resting") > _NO_STRESS * dem.material.young:
         if watch.strides % 4 == 0 and dem.unbalanced < unbalanced:
             return
 
