@@ -1,7 +1,11 @@
 """Discrete element method: grains in contact, moved by explicit steps (C14 §2.1). It knows nothing of fluids."""
 
 from porefv.dem.assembly import DEM, Contacts, Energies, Material, Plate
+from porefv.dem.generation import Grading, UniformSizes, cloud, grow, settle
 from porefv.dem.protocol import GrainModel
 from porefv.dem.trajectory import Trajectory
 
-__all__ = ["DEM", "Contacts", "Energies", "GrainModel", "Material", "Plate", "Trajectory"]
+__all__ = [
+    "DEM", "Contacts", "Energies", "Grading", "GrainModel", "Material", "Plate", "Trajectory", "UniformSizes",
+    "cloud", "grow", "settle",
+]  # fmt: skip
