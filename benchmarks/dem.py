@@ -128,11 +128,11 @@ def run_yade(yade: str) -> tuple[float, int]:
 def largest_step(friction: float) -> float:
     """Largest part of the critical step, in hundredths, at which energy does not grow in 5000 steps."""
     low, high = 0.1, 1.0
+    material = Material(MATERIAL.young, MATERIAL.stiffness_ratio, friction, MATERIAL.density)
+    critical = DEM(packing(2_000), material).critical_step
     while high - low > 0.015:
         part = 0.5 * (low + high)
-        material = Material(MATERIAL.young, MATERIAL.stiffness_ratio, friction, MATERIAL.density)
-        dem = DEM(packing(2_000), material)
-        dem = assembly(2_000, material, step=part * dem.critical_step)
+        dem = assembly(2_000, material, step=part * critical)
         before = dem.energies.stored
         try:
             dem.run(5_000)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import get_num_threads, njit, prange
 
+from porefv.doubling import doubled
 from porefv.errors import ComputationError
 from porefv.network import Network
 
@@ -280,9 +281,9 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
                         w[slot[j]] += half_links[link].weight
                     else:
                         if m + 2 > near.shape[0]:
-                            near = _doubled(near)
-                            w = _doubled(w)
-                            rest = _doubled(rest)
+                            near = doubled(near)
+                            w = doubled(w)
+                            rest = doubled(rest)
                         slot[j] = m
                         near[m] = j
                         w[m] = half_links[link].weight
@@ -301,8 +302,8 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
             order[eliminated] = i
             pivots[eliminated] = total
             if filled + m > rows.shape[0]:
-                rows = _doubled(rows)
-                factors = _doubled(factors)
+                rows = doubled(rows)
+                factors = doubled(factors)
             for q in range(m):
                 rows[filled] = near[q]
                 factors[filled] = w[q] / total
@@ -345,7 +346,7 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
                 elif a >= n and b >= n:
                     if n_kept == strengths.shape[0]:
                         kept = _doubled_pairs(kept)
-                        strengths = _doubled(strengths)
+                        strengths = doubled(strengths)
                     kept[n_kept, 0] = a
                     kept[n_kept, 1] = b
                     strengths[n_kept] = strength
@@ -360,7 +361,7 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
                             unused = half_links[link].following
                         else:
                             if used == half_links.shape[0]:
-                                half_links = _doubled(half_links)
+                                half_links = doubled(half_links)
                             link = np.int32(used)
                             used += 1
                         half_links[link].following = head[x]
@@ -450,14 +451,6 @@ def _backward(first, last, order, starts, rows, factors, pivots, r, z, y):
         z[order[k]] = s
         product += s * r[order[k]]
     return product
-
-
-@njit(cache=True)
-def _doubled(array):
-    larger = np.empty(2 * array.shape[0], array.dtype)
-    for i in range(array.shape[0]):
-        larger[i] = array[i]
-    return larger
 
 
 @njit(cache=True)

@@ -20,22 +20,29 @@ from porefv.facets import (
 )
 
 
+@njit(cache=True)
+def _sorted_vertices(t, cells, n):
+    """Vertices of cell t, spheres first, and how many are spheres."""
+    s = np.empty(4, np.int32)
+    ns = 0
+    for i in range(4):
+        if cells[t, i] < n:
+            s[ns] = cells[t, i]
+            ns += 1
+    nw = ns
+    for i in range(4):
+        if cells[t, i] >= n:
+            s[nw] = cells[t, i]
+            nw += 1
+    return s, ns
+
+
 @njit(cache=True, parallel=True)
 def polyhedron_volumes(cells, n, points, sizes):
     """Volume of each cell: its spheres' centres swept to its walls."""
     volumes = np.empty(cells.shape[0])
     for t in prange(cells.shape[0]):
-        s = np.empty(4, np.int32)  # spheres first
-        ns = 0
-        for i in range(4):
-            if cells[t, i] < n:
-                s[ns] = cells[t, i]
-                ns += 1
-        nw = ns
-        for i in range(4):
-            if cells[t, i] >= n:
-                s[nw] = cells[t, i]
-                nw += 1
+        s, ns = _sorted_vertices(t, cells, n)
         if ns == 4:
             u = _cross(_towards(s[0], s[1], n, points), _towards(s[0], s[2], n, points))
             volumes[t] = abs(_dot(u, _towards(s[0], s[3], n, points))) / 6.0
@@ -70,17 +77,7 @@ def volume_rates(cells, n, points, sizes, velocities, speeds):
     """
     rates = np.empty(cells.shape[0])
     for t in prange(cells.shape[0]):
-        s = np.empty(4, np.int32)  # spheres first
-        ns = 0
-        for i in range(4):
-            if cells[t, i] < n:
-                s[ns] = cells[t, i]
-                ns += 1
-        nw = ns
-        for i in range(4):
-            if cells[t, i] >= n:
-                s[nw] = cells[t, i]
-                nw += 1
+        s, ns = _sorted_vertices(t, cells, n)
         a = s[0]
         if ns == 4:
             u = _towards(a, s[1], n, points)

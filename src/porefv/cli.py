@@ -61,17 +61,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     pack = commands.add_parser("pack", help="make a packing of spheres, and write its file")
-    pack.add_argument("scene", metavar="SCENE.toml", type=Path)
-    pack.add_argument("--force", action="store_true", help="replace a file that exists")
-    pack.add_argument("--threads", metavar="N", type=_count, help="compute with at most N threads")
-    pack.add_argument("--quiet", action="store_true", help="print errors only")
+    _add_run_options(pack, force="replace a file that exists")
     pack.set_defaults(command=_pack)
 
     solve = commands.add_parser("solve", help="compute what a scene asks for, and write its results")
-    solve.add_argument("scene", metavar="SCENE.toml", type=Path)
-    solve.add_argument("--force", action="store_true", help="replace results that exist")
-    solve.add_argument("--threads", metavar="N", type=_count, help="compute with at most N threads")
-    solve.add_argument("--quiet", action="store_true", help="print errors only")
+    _add_run_options(solve, force="replace results that exist")
     solve.set_defaults(command=_solve)
 
     check = commands.add_parser("check", help="validate a scene and its packing without computing")
@@ -87,6 +81,14 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
     plot.set_defaults(command=_plot)
     return parser
+
+
+def _add_run_options(parser: argparse.ArgumentParser, force: str) -> None:
+    """What commands take that compute from a scene."""
+    parser.add_argument("scene", metavar="SCENE.toml", type=Path)
+    parser.add_argument("--force", action="store_true", help=force)
+    parser.add_argument("--threads", metavar="N", type=_count, help="compute with at most N threads")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
 
 
 def _count(text: str) -> int:

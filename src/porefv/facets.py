@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from porefv.doubling import doubled
 from porefv.union_find import join
 
 
@@ -94,10 +95,7 @@ def tied_facets(facet_cells, cell_node, cell_pore):
         j = facet_cells[f, 1]
         if cells[cell_node[i]] > 1 and cells[cell_node[j]] > 1 and cell_pore[i] != cell_pore[j]:
             if count == found.shape[0]:
-                larger = np.empty(2 * count, np.int64)
-                for k in range(count):
-                    larger[k] = found[k]
-                found = larger
+                found = doubled(found)
             found[count] = f
             count += 1
     return found[:count].copy()
@@ -184,6 +182,21 @@ def _at(i, array):
     return array[i, 0], array[i, 1], array[i, 2]
 
 
+@njit(cache=True)
+def _corners(f, facet_vertices, n, points):
+    """Vertices a, b, c of facet f, the vectors from a to b and to c, their cross product and its length.
+
+    The product has the facet's sense, and belongs to the angles at all three vertices.
+    """
+    a = facet_vertices[f, 0]
+    b = facet_vertices[f, 1]
+    c = facet_vertices[f, 2]
+    ab = _towards(a, b, n, points)
+    ac = _towards(a, c, n, points)
+    cross = _cross(ab, ac)
+    return a, b, c, ab, ac, cross, np.sqrt(_dot(cross, cross))
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, fluid, sectors, covered):
     """Unit normal, L = (P_j - P_i)·n, A^f, sector areas A^k of each facet, and whether its spheres cover it.
@@ -191,14 +204,7 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
     They do where its radical centre, the point of equal power in its plane, lies inside of them.
     """
     for f in prange(facet_cells.shape[0]):
-        a = facet_vertices[f, 0]
-        b = facet_vertices[f, 1]
-        c = facet_vertices[f, 2]
-        ab = _towards(a, b, n, points)
-        ac = _towards(a, c, n, points)
-        # The vector of the facet's sense; |ab x ac| belongs to the angles at all three vertices.
-        cross = _cross(ab, ac)
-        twice = np.sqrt(_dot(cross, cross))
+        a, b, c, ab, ac, cross, twice = _corners(f, facet_vertices, n, points)
         normal = _times(1.0 / twice if twice > 0.0 else 0.0, cross)
         ra = sizes[a]
         if c < n:
@@ -265,10 +271,17 @@ def _plane_distances(k, m, u, n, points, sizes):
     r = sizes[k]
     if m >= n:
         return min(max(_height(k, m, points, sizes), -r), r), 0.0
+    d, beyond = _feet(u, r, sizes[m])
+    return min(max(d, -r), r), min(max(beyond, -sizes[m]), sizes[m])
+
+
+@njit(cache=True, error_model="numpy")
+def _feet(u, r, s):
+    """Distances of the centres of two spheres of radii r and s, u apart, from the Laguerre plane between them."""
     square = _dot(u, u)
     length = np.sqrt(square)
-    d = 0.5 * (square + (r - sizes[m]) * (r + sizes[m])) / length
-    return min(max(d, -r), r), min(max(length - d, -sizes[m]), sizes[m])
+    d = 0.5 * (square + (r - s) * (r + s)) / length
+    return d, length - d
 
 
 @njit(cache=True)
@@ -286,13 +299,7 @@ def facet_volumes(facet_cells, facet_vertices, vertices, n, points, sizes, volum
     A L / 3, computed as S·(P_j - P_i) / 3 so that sums telescope exactly.
     """
     for f in prange(facet_cells.shape[0]):
-        a = facet_vertices[f, 0]
-        b = facet_vertices[f, 1]
-        c = facet_vertices[f, 2]
-        ab = _towards(a, b, n, points)
-        ac = _towards(a, c, n, points)
-        cross = _cross(ab, ac)
-        twice = np.sqrt(_dot(cross, cross))
+        a, b, c, ab, ac, cross, twice = _corners(f, facet_vertices, n, points)
         # P_i and P_j from the first sphere; their heights over the facet's plane, times `twice`.
         qi = _minus(_at(facet_cells[f, 0], vertices), _at(a, points))
         qj = _minus(_at(facet_cells[f, 1], vertices), _at(a, points))
@@ -414,13 +421,7 @@ def laguerre_volumes(facet_cells, facet_vertices, vertices, n, points, sizes):
     """
     volumes = np.zeros(n)
     for f in range(facet_cells.shape[0]):
-        a = facet_vertices[f, 0]
-        b = facet_vertices[f, 1]
-        c = facet_vertices[f, 2]
-        ab = _towards(a, b, n, points)
-        ac = _towards(a, c, n, points)
-        cross = _cross(ab, ac)
-        twice = np.sqrt(_dot(cross, cross))
+        a, b, c, ab, ac, cross, twice = _corners(f, facet_vertices, n, points)
         if twice == 0.0:
             continue
         pi = _at(facet_cells[f, 0], vertices)
@@ -431,17 +432,16 @@ def laguerre_volumes(facet_cells, facet_vertices, vertices, n, points, sizes):
             if k >= n:
                 continue
             # Along the edge from k to m, in the facet's cyclic sense and unit.
-            edge = _unit(_towards(k, m, n, points))
+            u = _towards(k, m, n, points)
+            edge = _unit(u)
             inward = _cross(cross, edge if side != 2 else _times(-1.0, edge))
             h = _dot(inward, _minus(pi, _at(k, points))) / twice
             if m >= n:
                 volumes[k] += _height(k, m, points, sizes) * h * length / 6.0
                 continue
-            u = _towards(k, m, n, points)
-            square = _dot(u, u)
-            d = 0.5 * (square + (sizes[k] - sizes[m]) * (sizes[k] + sizes[m])) / np.sqrt(square)
+            d, beyond = _feet(u, sizes[k], sizes[m])
             volumes[k] += d * h * length / 6.0
-            volumes[m] += (np.sqrt(square) - d) * h * length / 6.0
+            volumes[m] += beyond * h * length / 6.0
     return volumes
 
 

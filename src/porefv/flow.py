@@ -147,7 +147,7 @@ class PoreFlow:
                 self.mesh.throats.pores,
                 conductances,
                 self._held,
-                links=self.mesh.throats.areas,
+                links=lambda: self.mesh.throats.areas,
                 solver=self.solver,
                 tolerance=self.tolerance,
             )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from porefv.errors import InputError, counted, vector
 from porefv.io import EXTENSIONS, write_packing
 from porefv.packing import WALLS, Box, Packing
 from porefv.progress import Progress
-from porefv.scene_table import Table
+from porefv.scene_table import SceneFile, Table
 
 METHODS = ("cloud", "growth", "settling")
 _WRITTEN = ("csv", "yade", "vtk")  # formats
@@ -71,7 +70,7 @@ class PackProgress(Progress):
 
 
 @dataclass(frozen=True)
-class PackScene:
+class PackScene(SceneFile):
     """A packing to be made.
 
     Attributes
@@ -104,21 +103,9 @@ class PackScene:
     path: Path | None = None
 
     @classmethod
-    def read(cls, path: str | PathLike[str]) -> PackScene:
-        """Read a scene file; relative paths in it are relative to its directory.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, or says something that is unknown, of the wrong kind, or impossible.
-        """
-        path = Path(path)
-        return _scene(Table.read(path), path.parent, path)
-
-    @classmethod
-    def from_mapping(cls, data: Mapping[str, Any], directory: str | PathLike[str] = ".") -> PackScene:
-        """A scene from plain data, keys as in the file; relative paths are relative to `directory`."""
-        return _scene(Table(dict(data), source="scene"), Path(directory), None)
+    def from_table(cls, top: Table, directory: Path, path: Path | None = None) -> PackScene:
+        """The scene that a table says; relative paths in it are relative to `directory`."""
+        return _scene(top, directory, path)
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -240,7 +227,7 @@ def _scene(top: Table, directory: Path, path: Path | None) -> PackScene:
     return PackScene(
         number=_whole(grains, "number", least=1),
         sizes=_sizes(grains),
-        box=_box(top.table("box")),
+        box=top.table("box").box(lower=(0.0, 0.0, 0.0)),
         material=_material(top.table("material")),
         method=_METHODS[given[0]](top.table(given[0])),
         seed=_whole(top, "seed", least=0, default=0),
@@ -256,15 +243,6 @@ def _sizes(table: Table) -> UniformSizes | Grading:
     if not graded:
         return _made(table, UniformSizes, ratio=table.number("ratio", 0.5))
     return _made(table, Grading, diameters=_numbers(table, "diameters"), passing=_numbers(table, "passing"))
-
-
-def _box(table: Table) -> Box:
-    table.only("lower", "upper")
-    lower, upper = table.vector("lower", (0.0, 0.0, 0.0)), table.vector("upper")
-    try:
-        return Box(lower, upper)
-    except InputError as error:
-        raise table.error("upper", str(error)) from None
 
 
 def _material(table: Table) -> Material:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +37,7 @@ def solve_network(
     conductances: np.ndarray,
     fixed: np.ndarray,
     *,
-    links: np.ndarray | None = None,
+    links: Callable[[], np.ndarray] | None = None,
     sources: np.ndarray | None = None,
     solver: str = "auto",
     tolerance: float = TOLERANCE,
@@ -51,10 +52,10 @@ def solve_network(
         K of each throat, not negative [m³/(Pa s)].
     fixed : (n_pores,) array
         Imposed pressures, NaN where free [Pa].
-    links : (t,) array, optional
-        Positive weights by which pores without any flowing path to an imposed pressure take theirs from their
-        neighbours (equal weights by default). Nothing flows there: the rule only keeps their pressure, which the
-        flow leaves open, within that of their surroundings.
+    links : function, optional
+        Returns positive weights (t,), by which pores without any flowing path to an imposed pressure take theirs from
+        their neighbours (equal weights by default); called only if there are such. Nothing flows there: the rule
+        only keeps their pressure, which the flow leaves open, within that of their surroundings.
     sources : (n_pores,) array, optional
         Volume injected into each free pore per unit time [m³/s].
     solver, tolerance
@@ -84,10 +85,10 @@ def solve_network(
                 f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
                 "that lead to an imposed pressure: their pressure is not defined"
             )
-        links = np.ones(len(pairs)) if links is None else links
+        weights = np.ones(len(pairs)) if links is None else links()
         touching = isolated[pairs].any(axis=1)
         pressure, _ = _solve_free(
-            pairs[touching], links[touching], pressure, isolated, np.zeros(n), "direct", tolerance
+            pairs[touching], weights[touching], pressure, isolated, np.zeros(n), "direct", tolerance
         )
     return PressureSolution(pressure, isolated, report)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from porefv.boundary import Walls
 from porefv.conductance import MODELS, conductance_model
@@ -16,7 +15,7 @@ from porefv.flow import Fluid, PoreFlow
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Box, Packing
 from porefv.results import QUANTITIES, check_target, save, stages, writing
-from porefv.scene_table import Table
+from porefv.scene_table import SceneFile, Table
 from porefv.solvers import SOLVERS
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(SceneFile):
     """A computation, ready to run.
 
     Attributes
@@ -92,21 +91,9 @@ class Scene:
     path: Path | None = None
 
     @classmethod
-    def read(cls, path: str | PathLike[str]) -> Scene:
-        """Read a scene file; relative paths in it are relative to its directory.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, or says something that is unknown, of the wrong kind, or impossible.
-        """
-        path = Path(path)
-        return _scene(Table.read(path), path.parent, path)
-
-    @classmethod
-    def from_mapping(cls, data: Mapping[str, Any], directory: str | PathLike[str] = ".") -> Scene:
-        """A scene from plain data, keys as in the file; relative paths are relative to `directory`."""
-        return _scene(Table(dict(data), source="scene"), Path(directory), None)
+    def from_table(cls, top: Table, directory: Path, path: Path | None = None) -> Scene:
+        """The scene that a table says; relative paths in it are relative to `directory`."""
+        return _scene(top, directory, path)
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
@@ -195,7 +182,7 @@ def _scene(top: Table, directory: Path, path: Path | None) -> Scene:
     top.only("packing", "box", "fluid", "walls", "mesh", "flow", "output")
     scene = Scene(
         packing=_packing(top, directory),
-        box=_box(top) if "box" in top.data else None,
+        box=top.table("box").box() if "box" in top.data else None,
         fluid=_fluid(top.table("fluid")),
         walls=_walls(top.table("walls")),
         mesh=_mesh(top.table("mesh")),
@@ -219,15 +206,6 @@ def _packing(top: Table, directory: Path) -> PackingFile:
         what = "is not a file" if found.file.exists() else "does not exist"
         raise table.error(key, f"{found.file} {what}; paths are relative to the scene file")
     return found
-
-
-def _box(top: Table) -> Box:
-    table = top.table("box").only("lower", "upper")
-    lower, upper = table.vector("lower"), table.vector("upper")
-    try:
-        return Box(lower, upper)
-    except InputError as error:
-        raise table.error("upper", str(error)) from None
 
 
 def _fluid(table: Table) -> Fluid:

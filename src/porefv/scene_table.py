@@ -7,9 +7,11 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterable, Mapping
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
+from porefv.box import Box
 from porefv.errors import InputError
 
 _REQUIRED: Any = object()
@@ -104,6 +106,15 @@ class Table:
             raise self.error(key, f"expected three finite numbers such as [0.0, 0.0, 1.0], not {value!r}")
         return float(value[0]), float(value[1]), float(value[2])
 
+    def box(self, lower: Any = _REQUIRED) -> Box:
+        """The box that `lower`, with this default, and `upper` give."""
+        self.only("lower", "upper")
+        corners = self.vector("lower", lower), self.vector("upper")
+        try:
+            return Box(*corners)
+        except InputError as error:
+            raise self.error("upper", str(error)) from None
+
     def error(self, key: str, message: str) -> InputError:
         """An error about a key of this table: where, and what."""
         line = line_of(self.text, self.name, key)
@@ -118,6 +129,31 @@ class Table:
 
     def _full(self, key: str) -> str:
         return f"{self.name}.{key}" if self.name else key
+
+
+class SceneFile:
+    """A scene that is read from a TOML file, or from the same as plain data."""
+
+    @classmethod
+    def from_table(cls, top: Table, directory: Path, path: Path | None = None) -> Self:
+        raise NotImplementedError
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> Self:
+        """Read a scene file; relative paths in it are relative to its directory.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or says something that is unknown, of the wrong kind, or impossible.
+        """
+        path = Path(path)
+        return cls.from_table(Table.read(path), path.parent, path)
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any], directory: str | PathLike[str] = ".") -> Self:
+        """A scene from plain data, keys as in the file; relative paths are relative to `directory`."""
+        return cls.from_table(Table(dict(data), source="scene"), Path(directory))
 
 
 def message_of(key: str, message: str) -> str:

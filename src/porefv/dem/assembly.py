@@ -330,7 +330,6 @@ class DEM:
             If the motion runs away: a grain crosses a tenth of the smallest radius in one step, or is nowhere.
         """
         done = 0
-        fastest = _RUNAWAY * float(self._state[:, 3].min()) / self.step
         before = self._state[:, :3].copy() if self._applied.any() else None
         while done < steps:
             with threads(self.threads):
@@ -342,7 +341,7 @@ class DEM:
                     self.material.stiffness_ratio, self.material.friction, self._wall_friction,
                     self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN,
                     self._loads, self._wall_loads, self._wall_forces, self._start, self._wall_start, self._slack,
-                    fastest, self._work,
+                    self.fastest, self._work,
                 )  # fmt: skip
             done += taken
             self.steps += taken
@@ -353,6 +352,11 @@ class DEM:
                 self._list_pairs()
         if before is not None:
             self._applied_work += float((self._applied * (self._state[:, :3] - before)).sum())
+
+    @property
+    def fastest(self) -> float:
+        """Speed at which the motion counts as runaway [m/s]."""
+        return _RUNAWAY * float(self._state[:, 3].min()) / self.step
 
     def run_to_rest(self, unbalanced: float = 1e-3, stress: float = 1e-2, most: int = 200_000) -> int:
         """Take steps until the grains are at rest and walls press with their stresses; returns how many.
@@ -556,7 +560,7 @@ class DEM:
         if len(contacts) == 0:
             return math.inf
         mean = float(np.sqrt((contacts.forces**2).sum(axis=1)).mean())
-        loads, _ = self._forces()
+        loads = self._forces()
         total = loads[:, :3] + self._applied + self.gravity / self._inverse_mass[:, None]
         return float(np.sqrt((total**2).sum(axis=1)).mean()) / mean
 
@@ -564,7 +568,7 @@ class DEM:
     def energies(self) -> Energies:
         """Energies at time t."""
         s = self._state
-        loads, _ = self._forces()
+        loads = self._forces()
         accelerations = (loads[:, :3] + self._applied) * self._inverse_mass[:, None] + self.gravity
         turns = loads[:, 3:] * self._inverse_inertia[:, None]
         v, w = s[:, 4:7], s[:, 7:10]
@@ -583,9 +587,9 @@ class DEM:
         sliding, walls, damped = self._work
         return Energies(float(kinetic), elastic, potential, sliding, damped, walls, self._applied_work)
 
-    def _forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Contact loads on grains (n, 6), inside numbering, and on walls (6, 4); tangential forces as they stand."""
-        loads, wall_loads = np.zeros((len(self), 6)), np.zeros((6, 4))
+    def _forces(self) -> np.ndarray:
+        """Contact loads on grains (n, 6), inside numbering; tangential forces as they stand."""
+        loads = np.zeros((len(self), 6))
         grain_contacts(
             0, len(self), self._state, self._starts, self._others, self._stiffness, self.material.stiffness_ratio,
             self.material.friction, 0.0, self._shear.copy(), self._touching.copy(), loads,
@@ -593,9 +597,9 @@ class DEM:
         wall_contacts(
             0, len(self._rims), self._state, self._rims, self._rim_stiffness, self.material.stiffness_ratio,
             self._wall_friction, 0.0, self.places, self.wall_velocities, self._rim_shear.copy(),
-            self._rim_touching.copy(), loads, wall_loads,
+            self._rim_touching.copy(), loads, np.zeros((6, 4)),
         )  # fmt: skip
-        return loads, wall_loads
+        return loads
 
     def __repr__(self) -> str:
         return f"DEM({len(self)} grains, {self.steps} steps of {self.step:.3g} s, porosity {self.porosity:.4f})"

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from porefv import __version__
-from porefv.dem.assembly import _RUNAWAY, DEM, Material, Plate
+from porefv.dem.assembly import DEM, Material, Plate
 from porefv.errors import ComputationError, InputError
 from porefv.io.atomic import atomic_write
 
@@ -167,7 +167,7 @@ def _key(attribute: str) -> str:
 def _refuse_runaway(dem: DEM, path: str | PathLike[str]) -> None:
     state = dem._state
     speeds = np.sqrt((state[:, 4:7] ** 2).sum(axis=1))
-    good = np.isfinite(state).all(axis=1) & (speeds <= _RUNAWAY * state[:, 3].min() / dem.step)
+    good = np.isfinite(state).all(axis=1) & (speeds <= dem.fastest)
     if not good.all():
         worst = int(np.argmin(good))
         raise ComputationError(

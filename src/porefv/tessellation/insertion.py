@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from porefv.doubling import doubled
 from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, power_centre, row, side
 
 # Relative error of a power centre beyond which it is computed again in exact arithmetic.
@@ -78,14 +79,14 @@ def insert(
             n_stack -= 1
             c = stack[n_stack]
             if n_dead + 1 >= dead.shape[0]:
-                dead = _grown(dead)
+                dead = doubled(dead)
             dead[n_dead] = c
             n_dead += 1
             if n_stack + 4 >= stack.shape[0]:
-                stack = _grown(stack)
+                stack = doubled(stack)
             if n_rim + 4 >= rim_cells.shape[0]:
-                rim_cells = _grown(rim_cells)
-                rim_facets = _grown(rim_facets)
+                rim_cells = doubled(rim_cells)
+                rim_facets = doubled(rim_facets)
             for i in range(4):
                 u = neighbours[c, i]
                 inside = False
@@ -261,11 +262,3 @@ def _numerator(au, av, bu, bv, cu, cv, ha, hb, hc, ta, tb, tc):
         ta * (abs(bu * cv) + abs(bv * cu)) + tb * (abs(cu * av) + abs(cv * au)) + tc * (abs(au * bv) + abs(av * bu))
     )
     return value, permanent
-
-
-@njit(cache=True)
-def _grown(array):
-    larger = np.empty(2 * array.shape[0], array.dtype)
-    for i in range(array.shape[0]):  # a loop compiles in a fraction of the time of a slice
-        larger[i] = array[i]
-    return larger
