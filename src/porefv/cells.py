@@ -10,7 +10,6 @@ from porefv.facets import (
     _cross,
     _dot,
     _height,
-    _minus,
     _overlaps,
     _plane_distances,
     _towards,
@@ -70,68 +69,93 @@ def polyhedron_volumes(cells, n, points, sizes):
 
 
 @njit(cache=True, parallel=True)
-def volume_rates(cells, n, points, sizes, velocities, speeds):
-    """Rate of the volume of each cell: the exact derivative of `polyhedron_volumes`, linear in the velocities.
+def volume_gradients(cells, n, points, sizes):
+    """(m, 4, 3): derivative of the volume of each cell by the place of each of its vertices.
 
-    velocities (n, 3) are those of the spheres' centres, speeds (6,) those of the walls along their outward normals.
+    A wall's place is that along its outward normal: its derivative, a vector along that, is the area of the cell's
+    face on it.
     """
-    rates = np.empty(cells.shape[0])
+    gradients = np.empty((cells.shape[0], 4, 3))
     for t in prange(cells.shape[0]):
         s, ns = _sorted_vertices(t, cells, n)
-        a = s[0]
-        if ns == 4:
-            u = _towards(a, s[1], n, points)
-            v = _towards(a, s[2], n, points)
-            w = _towards(a, s[3], n, points)
-            du = _minus(_at(s[1], velocities), _at(a, velocities))
-            dv = _minus(_at(s[2], velocities), _at(a, velocities))
-            dw = _minus(_at(s[3], velocities), _at(a, velocities))
-            sense = 1.0 if _dot(_cross(u, v), w) > 0.0 else -1.0
-            rate = _dot(_cross(v, w), du) + _dot(_cross(w, u), dv) + _dot(_cross(u, v), dw)
-            rates[t] = sense * rate / 6.0
-        elif ns == 3:
-            d = _at(s[3], points)
-            u = _towards(a, s[1], n, points)
-            v = _towards(a, s[2], n, points)
-            du = _minus(_at(s[1], velocities), _at(a, velocities))
-            dv = _minus(_at(s[2], velocities), _at(a, velocities))
-            base = 0.5 * _dot(_cross(u, v), d)
-            base_rate = 0.5 * (_dot(_cross(du, v), d) + _dot(_cross(u, dv), d))
-            height = 0.0
-            height_rate = 0.0
-            for i in range(3):
-                height += _height(s[i], s[3], points, sizes)
-                height_rate += speeds[s[3] - n] - _dot(_at(s[i], velocities), d)
-            sense = 1.0 if base > 0.0 else -1.0
-            rates[t] = sense * (base_rate * height + base * height_rate) / 3.0
-        elif ns == 2:
-            b = s[1]
-            d1 = _at(s[2], points)
-            d2 = _at(s[3], points)
-            edge = _cross(d1, d2)
-            u = _dot(_towards(a, b, n, points), edge)
-            du = _dot(_minus(_at(b, velocities), _at(a, velocities)), edge)
-            a0 = _height(a, s[2], points, sizes)
-            a1 = _height(b, s[2], points, sizes)
-            b0 = _height(a, s[3], points, sizes)
-            b1 = _height(b, s[3], points, sizes)
-            da0 = speeds[s[2] - n] - _dot(_at(a, velocities), d1)
-            da1 = speeds[s[2] - n] - _dot(_at(b, velocities), d1)
-            db0 = speeds[s[3] - n] - _dot(_at(a, velocities), d2)
-            db1 = speeds[s[3] - n] - _dot(_at(b, velocities), d2)
-            section = 2.0 * a0 * b0 + 2.0 * a1 * b1 + a0 * b1 + a1 * b0
-            section_rate = 2.0 * (da0 * b0 + a0 * db0 + da1 * b1 + a1 * db1) + da0 * b1 + a0 * db1 + da1 * b0 + a1 * db0
-            sense = 1.0 if u > 0.0 else -1.0
-            rates[t] = sense * (du * section + u * section_rate) / 6.0
-        else:
-            rates[t] = 0.0
-            for i in range(1, 4):
-                rate = speeds[s[i] - n] - _dot(_at(a, velocities), _at(s[i], points))
-                for j in range(1, 4):
-                    if j != i:
-                        rate *= _height(a, s[j], points, sizes)
-                rates[t] += rate
-    return rates
+        by = _gradients_by_vertex(s, ns, n, points, sizes)
+        for i in range(4):
+            for j in range(4):
+                if s[j] == cells[t, i]:
+                    for axis in range(3):
+                        gradients[t, i, axis] = by[j, axis]
+    return gradients
+
+
+@njit(cache=True)
+def _gradients_by_vertex(s, ns, n, points, sizes):
+    """(4, 3): derivatives of one cell's volume; spheres come first in s."""
+    by = np.zeros((4, 3))
+    a = s[0]
+    if ns == 4:
+        u = _towards(a, s[1], n, points)
+        v = _towards(a, s[2], n, points)
+        w = _towards(a, s[3], n, points)
+        share = (1.0 if _dot(_cross(u, v), w) > 0.0 else -1.0) / 6.0
+        _add_difference(by, 1, share, _cross(v, w))
+        _add_difference(by, 2, share, _cross(w, u))
+        _add_difference(by, 3, share, _cross(u, v))
+    elif ns == 3:
+        d = _at(s[3], points)
+        u = _towards(a, s[1], n, points)
+        v = _towards(a, s[2], n, points)
+        base = 0.5 * _dot(_cross(u, v), d)
+        share = (1.0 if base > 0.0 else -1.0) / 3.0
+        height = 0.0
+        for i in range(3):
+            height += _height(s[i], s[3], points, sizes)
+            _add(by, i, -share * base, d)
+        _add(by, 3, 3.0 * share * base, d)
+        _add_difference(by, 1, 0.5 * share * height, _cross(v, d))
+        _add_difference(by, 2, 0.5 * share * height, _cross(d, u))
+    elif ns == 2:
+        d = _at(s[2], points)
+        e = _at(s[3], points)
+        edge = _cross(d, e)
+        length = _dot(_towards(a, s[1], n, points), edge)
+        share = (1.0 if length > 0.0 else -1.0) / 6.0
+        d0 = _height(a, s[2], points, sizes)
+        d1 = _height(s[1], s[2], points, sizes)
+        e0 = _height(a, s[3], points, sizes)
+        e1 = _height(s[1], s[3], points, sizes)
+        _add_difference(by, 1, share * (2.0 * d0 * e0 + 2.0 * d1 * e1 + d0 * e1 + d1 * e0), edge)
+        by_d0 = share * length * (2.0 * e0 + e1)
+        by_d1 = share * length * (2.0 * e1 + e0)
+        by_e0 = share * length * (2.0 * d0 + d1)
+        by_e1 = share * length * (2.0 * d1 + d0)
+        _add(by, 0, -by_d0, d)
+        _add(by, 0, -by_e0, e)
+        _add(by, 1, -by_d1, d)
+        _add(by, 1, -by_e1, e)
+        _add(by, 2, by_d0 + by_d1, d)
+        _add(by, 3, by_e0 + by_e1, e)
+    else:
+        for i in range(1, 4):
+            face = 1.0
+            for j in range(1, 4):
+                if j != i:
+                    face *= _height(a, s[j], points, sizes)
+            _add(by, i, face, _at(s[i], points))
+            _add(by, 0, -face, _at(s[i], points))
+    return by
+
+
+@njit(cache=True)
+def _add(by, i, factor, vector):
+    for axis in range(3):
+        by[i, axis] += factor * vector[axis]
+
+
+@njit(cache=True)
+def _add_difference(by, i, factor, vector):
+    """Derivative by the way from the first vertex to vertex i."""
+    _add(by, i, factor, vector)
+    _add(by, 0, -factor, vector)
 
 
 @njit(cache=True, parallel=True)

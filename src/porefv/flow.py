@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.boundary import Walls
+from porefv.boundary import LEAST, MOST, Walls, within_range
 from porefv.conductance import ConductanceModel, HydraulicRadius
-from porefv.errors import InputError
+from porefv.errors import ComputationError, InputError
 from porefv.forces import Forces, fluid_forces
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
@@ -45,8 +45,39 @@ class Fluid:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.viscosity) and self.viscosity > 0.0):
             raise InputError(f"viscosity must be a positive number of Pa s, not {self.viscosity!r}")
+        if not within_range(self.viscosity):
+            raise InputError(f"viscosity must lie between {LEAST:g} and {MOST:g} Pa s, not {self.viscosity!r}")
         if not (math.isfinite(self.density) and self.density >= 0.0):
             raise InputError(f"density must be a number of kg/m³, zero or more, not {self.density!r}")
+        if self.density > MOST:
+            raise InputError(f"density must be at most {MOST:g} kg/m³, not {self.density!r}")
+
+
+def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarray, viscosity: float) -> np.ndarray:
+    """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
+    throats = mesh.throats
+    conductivity = model.conductivity(throats, slip)
+    # A throat between Laguerre vertices closer than rounding is not longer than that.
+    shortest = np.finfo(float).eps * float(mesh.packing.radii.min())
+    lengths = np.maximum(throats.lengths, shortest)
+    lengths *= viscosity
+    conductances = np.divide(conductivity, lengths, out=lengths)
+    conductances[(conductivity <= 0.0) | throats.closed] = 0.0
+    return conductances
+
+
+def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
+    """(n_pores,): pressure of the pores on walls of given pressure (6,), NaN elsewhere [Pa].
+
+    Pores that touch several such walls take the mean of theirs.
+    """
+    faces = mesh.wall_faces
+    held = ~np.isnan(pressures[faces.walls])
+    pores = mesh.cell_pore[faces.cells[held]]
+    pairs = np.unique(np.stack([pores, faces.walls[held]], axis=1), axis=0)
+    count = np.bincount(pairs[:, 0], minlength=mesh.n_pores)
+    total = np.bincount(pairs[:, 0], pressures[pairs[:, 1]], mesh.n_pores)
+    return np.divide(total, count, out=np.full(mesh.n_pores, np.nan), where=count > 0)
 
 
 class PoreFlow:
@@ -93,6 +124,8 @@ class PoreFlow:
         self.timings: dict[str, float] = {}
         if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
             raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
+        if np.abs(self.gravity).max() > MOST:
+            raise InputError(f"gravity must be at most {MOST:g} m/s² along each axis, not {gravity!r}")
         if np.isnan(walls.pressures).all():
             raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
 
@@ -106,15 +139,19 @@ class PoreFlow:
     @cached_property
     def _held(self) -> np.ndarray:
         """Imposed pressures less the lowest of them."""
+        return held_pressures(self.mesh, self.walls.pressures - self._reference)
+
+    @property
+    def pores_of_several_pressures(self) -> np.ndarray:
+        """(n_pores,) bool: pores that touch walls of different imposed pressures."""
         faces = self.mesh.wall_faces
-        imposed = (self.walls.pressures - self._reference)[faces.walls]
+        imposed = self.walls.pressures[faces.walls]
         held = ~np.isnan(imposed)
         pores = self.mesh.cell_pore[faces.cells[held]]
-        pairs = np.unique(np.stack([pores, faces.walls[held]], axis=1), axis=0)
-        values = (self.walls.pressures - self._reference)[pairs[:, 1]]
-        count = np.bincount(pairs[:, 0], minlength=self.mesh.n_pores)
-        total = np.bincount(pairs[:, 0], values, self.mesh.n_pores)
-        return np.divide(total, count, out=np.full(self.mesh.n_pores, np.nan), where=count > 0)
+        lowest, highest = np.full(self.mesh.n_pores, np.inf), np.full(self.mesh.n_pores, -np.inf)
+        np.minimum.at(lowest, pores, imposed[held])
+        np.maximum.at(highest, pores, imposed[held])
+        return lowest < highest
 
     @property
     def imposed_pressures(self) -> np.ndarray:
@@ -128,15 +165,7 @@ class PoreFlow:
     def conductances(self) -> np.ndarray:
         """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
         with self._timed("throats"):
-            throats = self.mesh.throats
-            conductivity = self.conductance.conductivity(throats, self.walls.slip)
-            # A throat between Laguerre vertices closer than rounding is not longer than that.
-            shortest = np.finfo(float).eps * float(self.mesh.packing.radii.min())
-            lengths = np.maximum(throats.lengths, shortest)
-            lengths *= self.fluid.viscosity
-            conductances = np.divide(conductivity, lengths, out=lengths)
-            conductances[(conductivity <= 0.0) | throats.closed] = 0.0
-            return conductances
+            return throat_conductances(self.mesh, self.conductance, self.walls.slip, self.fluid.viscosity)
 
     @cached_property
     def solution(self) -> PressureSolution:
@@ -172,9 +201,9 @@ class PoreFlow:
     @cached_property
     def flux(self) -> np.ndarray:
         """(t,): flux through each throat, from its first pore to its second [m³/s]."""
-        p = self.solution.pressure
+        p, rest = self.solution.pressure, self.solution.rest
         i, j = self.mesh.throats.pores.T
-        return self.conductances * (p[i] - p[j])
+        return _finite(self.conductances * ((p[i] - p[j]) + (rest[i] - rest[j])), "fluxes")
 
     @cached_property
     def _outflow(self) -> np.ndarray:
@@ -243,7 +272,7 @@ class PoreFlow:
     @cached_property
     def pore_velocity(self) -> np.ndarray:
         """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
-        return pore_velocities(self.mesh, self.flux, self._face_flux)
+        return _finite(pore_velocities(self.mesh, self.flux, self._face_flux), "velocities")
 
     # ---- forces -------------------------------------------------------------------------------------------------
 
@@ -252,7 +281,7 @@ class PoreFlow:
         """Forces on every sphere and wall."""
         pressure = self.solution.pressure
         with self._timed("forces"):
-            return fluid_forces(
+            forces = fluid_forces(
                 self.mesh,
                 pressure,
                 ~np.isnan(self.walls.pressures),
@@ -260,6 +289,8 @@ class PoreFlow:
                 reference=self._reference,
                 weight=self.fluid.density * self.gravity,
             )
+            _finite(forces.total, "forces")
+            return forces
 
     def to_fipy(self) -> FipyProblem:
         """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
@@ -276,6 +307,14 @@ class PoreFlow:
         held = ", ".join(f"{name} {wall.pressure:g} Pa" for name, wall in zip(WALLS, self.walls, strict=True)
                          if wall.pressure is not None)  # fmt: skip
         return f"PoreFlow({self.mesh!r}, {self.conductance.name}, {held})"
+
+
+def _finite(values: np.ndarray, what: str) -> np.ndarray:
+    """The values, or a ComputationError if any is not finite: nothing else leaves the flow."""
+    bad = np.count_nonzero(~np.isfinite(values))
+    if bad:
+        raise ComputationError(f"{bad} of {values.size} {what} are not finite numbers; nothing can be said of this flow")
+    return values
 
 
 class _Timer:

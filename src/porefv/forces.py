@@ -64,7 +64,7 @@ class Forces:
         """Distance of the sum of all pressure and viscous forces from the thrust, relative to ΔP S."""
         parts = (self.pressure, self.viscous, self.wall_pressure, self.wall_viscous)
         residual = np.abs(sum(part.sum(axis=0) for part in parts) - self.thrust).max()
-        return float(residual / self.scale) if residual > 0.0 else 0.0
+        return float(residual / self.scale) if residual != 0.0 else 0.0
 
     def __repr__(self) -> str:
         total = ", ".join(f"{x:.4g}" for x in self.total.sum(axis=0))
@@ -98,13 +98,11 @@ def fluid_forces(
     throats = mesh.throats
     on_spheres_p = np.zeros((n + 6, 3))
     on_spheres_v = np.zeros((n + 6, 3))
-    weights = throats.facet_wetted_surfaces(slip)
     cell_pressure = pressure[mesh.cell_pore]
     drops = cell_pressure[mesh.facet_cells[:, 0]] - cell_pressure[mesh.facet_cells[:, 1]]
-    vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
-    sums = throats.total_by_facet(_positive_sum(weights))
+    vectors, shares = _drag(mesh, slip)
     _scatter(
-        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, weights, sums, drops, n,
+        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, shares, drops,
         on_spheres_p, on_spheres_v,
     )  # fmt: skip
 
@@ -140,6 +138,22 @@ def fluid_forces(
     )
 
 
+def facet_forces(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
+    """(f, 3, 3): force on each vertex of each facet for a unit of pressure drop across it: A^k n + A^f n γ^k/Σγ [m²]."""
+    vectors, shares = _drag(mesh, slip)
+    sectors = mesh.throats.facet_sectors[:, :, None] * mesh.throats.facet_normals[:, None, :]
+    return sectors + shares[:, :, None] * vectors[:, None, :]
+
+
+def _drag(mesh: PoreMesh, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Viscous force (f, 3) for a unit of pressure drop, A^f n of the facet's throat, and its vertices' shares (f, 3)."""
+    throats = mesh.throats
+    weights = throats.facet_wetted_surfaces(slip)
+    sums = throats.total_by_facet(_positive_sum(weights))
+    vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
+    return vectors, _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
+
+
 @njit(cache=True)
 def _positive_sum(weights):
     """(f,): sum of the positive weights of each facet."""
@@ -151,21 +165,29 @@ def _positive_sum(weights):
 
 
 @njit(cache=True)
-def _scatter(facet_vertices, normals, sectors, vectors, weights, sums, drops, n, pressure, viscous):
-    """Add every facet's forces to its vertices.
+def _shares(weights, sums, facets):
+    """(f, 3): γ^k / Σγ, the negative γ^k that a signed decomposition can give taken as zero.
 
-    F^{p,k} = A^k (p_i - p_j) n;  F^{v,k} = A^f (p_i - p_j) n γ^k / Σγ, the negative γ^k that a signed decomposition can
-    give taken as zero; where no γ^k is positive, the vertices share equally.
+    Where no γ^k is positive, the vertices of all the facets of the throat share equally.
     """
+    shares = np.empty_like(weights)
+    for f in range(weights.shape[0]):
+        for v in range(3):
+            shares[f, v] = max(weights[f, v], 0.0) / sums[f] if sums[f] > 0.0 else 1.0 / (3.0 * facets[f])
+    return shares
+
+
+@njit(cache=True)
+def _scatter(facet_vertices, normals, sectors, vectors, shares, drops, pressure, viscous):
+    """Add every facet's forces to its vertices: F^{p,k} = A^k (p_i - p_j) n, F^{v,k} = A^f (p_i - p_j) n γ^k / Σγ."""
     for f in range(facet_vertices.shape[0]):
         if drops[f] == 0.0:
             continue
         for v in range(3):
             k = facet_vertices[f, v]
-            share = max(weights[f, v], 0.0) / sums[f] if sums[f] > 0.0 else 1.0 / 3.0
             for axis in range(3):
                 pressure[k, axis] += sectors[f, v] * drops[f] * normals[f, axis]
-                viscous[k, axis] += share * drops[f] * vectors[f, axis]
+                viscous[k, axis] += shares[f, v] * drops[f] * vectors[f, axis]
 
 
 def _hydrostatic(mesh, weight):

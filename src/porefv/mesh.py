@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv import memory
-from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_rates
+from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_gradients
 from porefv.errors import InputError
 from porefv.facets import enumerate_facets, laguerre_volumes, unite
 from porefv.packing import Box, Packing
@@ -202,10 +202,17 @@ class PoreMesh:
         -------
         (m,) array [m³/s]
         """
-        return volume_rates(
-            self.cells, self.n_spheres, self.local_points, self.sizes,
-            np.ascontiguousarray(velocities, float), np.ascontiguousarray(wall_speeds, float),
-        )  # fmt: skip
+        outward = np.asarray(wall_speeds, float)[:, None] * wall_normals()
+        moves = np.concatenate([np.broadcast_to(velocities, (self.n_spheres, 3)), outward])
+        return np.einsum("tia,tia->t", self.volume_gradients, moves[self.cells])
+
+    @property
+    def volume_gradients(self) -> np.ndarray:
+        """(m, 4, 3): derivative of each cell's volume by the place of each of its vertices [m²].
+
+        A wall's place is that along its outward normal: its derivative is the cell's face on it, times that normal.
+        """
+        return volume_gradients(self.cells, self.n_spheres, self.local_points, self.sizes)
 
     @cached_property
     def cell_void_volumes(self) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import get_num_threads, njit
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
-from porefv.dem.motion import CROWDED, RUNAWAY, advance
+from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, advance, wall_excess
 from porefv.errors import ComputationError, InputError
 from porefv.neighbours import neighbour_pairs
 from porefv.packing import WALLS, Box, Packing
@@ -223,7 +223,7 @@ class DEM:
         self._applied = np.zeros((n, 3))
         self.places = np.stack([packing.box.lower, packing.box.upper], axis=1).ravel()
         self.wall_velocities = np.zeros((6, 3))
-        self._wall_forces = np.zeros((6, 3))
+        self._wall_forces, self._wall_yields = np.zeros((6, 3)), np.zeros(6)
         self._pairs, self._others = np.empty((0, 2), np.int32), np.empty(0, np.int32)
         self._shear, self._touching = np.empty((0, 3)), np.empty(0, bool)
         self._rims = np.empty((0, 2), np.int32)
@@ -232,6 +232,7 @@ class DEM:
         self._applied_work = 0.0
         self._loads = np.zeros((self.threads, n, 6))
         self._wall_loads = np.zeros((self.threads, 6, 4))
+        self._halfway = False
         self.steps = 0
         self.time = 0.0
         self.set_plates(plates or {})
@@ -329,29 +330,81 @@ class DEM:
         ComputationError
             If the motion runs away: a grain crosses a tenth of the smallest radius in one step, or is nowhere.
         """
-        done = 0
+        if self._halfway:
+            raise InputError("a step is half taken: finish it with `correct` before the next")
         before = self._state[:, :3].copy() if self._applied.any() else None
+        done = 0
         while done < steps:
-            with threads(self.threads):
-                taken, reason = advance(
-                    steps - done, self.step, self._state, self._inverse_mass, self._inverse_inertia, self._applied,
-                    self.gravity, self.damping,
-                    self._starts, self._others, self._stiffness, self._shear, self._touching, self._shares,
-                    self._rims, self._rim_stiffness, self._rim_shear, self._rim_touching, self._rim_shares,
-                    self.material.stiffness_ratio, self.material.friction, self._wall_friction,
-                    self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN,
-                    self._loads, self._wall_loads, self._wall_forces, self._start, self._wall_start, self._slack,
-                    self.fastest, self._work,
-                )  # fmt: skip
-            done += taken
-            self.steps += taken
-            self.time += taken * self.step
-            if reason == RUNAWAY:
-                self._fail()
-            if reason == CROWDED:
-                self._list_pairs()
+            done += self._advance(WHOLE, steps - done, self._applied, np.zeros(6))
         if before is not None:
             self._applied_work += float((self._applied * (self._state[:, :3] - before)).sum())
+
+    def predict(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Take the first half of a step: contact forces, but no motion; `correct` takes the other.
+
+        Returns
+        -------
+        velocities (n, 3) array
+            That grains would have after the step, grain i in row `slots[i]` [m/s].
+        wall_speeds (6,) array
+            That walls would have, along their outward normals [m/s].
+        mobilities (n,), wall_mobilities (6,) arrays
+            What a force applied over the step adds to them: dt / m for grains, in the same rows; for pressing walls
+            what they yield, for other walls nothing [m/(s N)].
+
+        Raises
+        ------
+        InputError
+            With damping, which would not see the forces that are still to come.
+        """
+        if self.damping > 0.0:
+            raise InputError("damping is for dry preparation: set it to 0 where a fluid moves with the grains")
+        if not self._halfway:
+            self._advance(FORCES, 1, self._applied, np.zeros(6))
+            self._halfway = True
+        mobilities = self.step * self._inverse_mass
+        velocities = _free_velocities(self._state, self._loads, self._applied, mobilities, self.step * self.gravity)
+        speeds = self.wall_velocities[np.arange(6), np.arange(6) // 2] * np.tile([-1.0, 1.0], 3)
+        for w in np.flatnonzero(~np.isnan(self._targets)):
+            speeds[w] = self._wall_yields[w] * wall_excess(w, self.places, self._targets, self._wall_forces)
+        return velocities, speeds, mobilities, self._wall_yields
+
+    def correct(self, forces: np.ndarray, thrusts: np.ndarray) -> None:
+        """Take the second half of a step, after `predict`, under forces on grains and walls besides all others.
+
+        Parameters
+        ----------
+        forces : (n, 3) array
+            On grain i in row `slots[i]`, over this step alone [N].
+        thrusts : (6,) array
+            On the walls, along their outward normals [N].
+        """
+        if not self._halfway:
+            raise InputError("`correct` ends a step that `predict` has begun")
+        self._halfway = False
+        self._advance(MOTION, 1, self._applied + forces, np.asarray(thrusts, float))
+        self._applied_work += self.step * float(np.vdot(self._applied + forces, self._state[:, 4:7]))
+
+    def _advance(self, half: int, steps: int, applied: np.ndarray, thrusts: np.ndarray) -> int:
+        """Take steps until pairs must be listed anew; returns how many."""
+        with threads(self.threads):
+            taken, reason = advance(
+                steps, half, self.step, self._state, self._inverse_mass, self._inverse_inertia, applied,
+                self.gravity, self.damping,
+                self._starts, self._others, self._stiffness, self._shear, self._touching, self._shares,
+                self._rims, self._rim_stiffness, self._rim_shear, self._rim_touching, self._rim_shares,
+                self.material.stiffness_ratio, self.material.friction, self._wall_friction,
+                self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN, self._wall_yields, thrusts,
+                self._loads, self._wall_loads, self._wall_forces, self._start, self._wall_start, self._slack,
+                self.fastest, self._work,
+            )  # fmt: skip
+        self.steps += taken
+        self.time += taken * self.step
+        if reason == RUNAWAY:
+            self._fail()
+        if reason == CROWDED:
+            self._list_pairs()
+        return taken
 
     @property
     def fastest(self) -> float:
@@ -436,6 +489,11 @@ class DEM:
     def positions(self) -> np.ndarray:
         """(n, 3): centres at time t [m]."""
         return self._state[self._rank, :3]
+
+    @property
+    def slots(self) -> np.ndarray:
+        """(n,): row of each grain in the arrays of `predict` and `correct`."""
+        return self._rank
 
     @property
     def radii(self) -> np.ndarray:
@@ -634,6 +692,19 @@ def _check_grains(packing: Packing) -> None:
             f"grains {i[pair]} and {j[pair]} overlap by {depth[pair]:.3g} m, more than the smaller's radius: contact "
             "forces would throw them apart. Start from grains apart, or grow them (porefv.dem.grow)"
         )
+
+
+@njit(cache=True)
+def _free_velocities(state, loads, applied, mobilities, fall):
+    """Velocities after a step under the loads there are; `fall` is what gravity adds."""
+    velocities = np.empty((state.shape[0], 3))
+    for i in range(state.shape[0]):
+        for a in range(3):
+            force = applied[i, a]
+            for s in range(loads.shape[0]):
+                force += loads[s, i, a]
+            velocities[i, a] = state[i, 4 + a] + mobilities[i] * force + fall[a]
+    return velocities
 
 
 @njit(cache=True)

@@ -37,6 +37,7 @@ _ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "_inverse_mass": ("f8", ("n",)),
     "_inverse_inertia": ("f8", ("n",)),
     "_wall_forces": ("f8", (6, 3)),
+    "_wall_yields": ("f8", (6,)),
     "_targets": ("f8", (6,)),
     "_top_speeds": ("f8", (6,)),
     "_wall_friction": ("f8", (6,)),
@@ -56,8 +57,8 @@ _ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "_wall_start": ("f8", (6,)),
     "_work": ("f8", (3,)),
 }
-# Zero between two runs, and made anew.
-_LOADS = ("_loads", "_wall_loads")
+# Zero between two steps, and made anew.
+_LOADS = ("_loads", "_wall_loads", "_halfway")
 
 # Every attribute of a DEM; tests compare it with what there is.
 ATTRIBUTES = frozenset(("material", "plates", *_NUMBERS, *_ARRAYS, *_LOADS))
@@ -79,6 +80,15 @@ def save(dem: DEM, path: str | PathLike[str]) -> None:
     InputError
         If the file cannot be written.
     """
+    content = pack(dem, path)
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, **content)
+
+
+def pack(dem: DEM, path: str | PathLike[str]) -> dict[str, Any]:
+    """The arrays of a checkpoint, for `path`; errors as `save`."""
+    if dem._halfway:
+        raise InputError("a step is half taken: finish it with `correct` before its state is saved")
     _refuse_runaway(dem, path)
     header = {
         "format": FORMAT,
@@ -90,9 +100,7 @@ def save(dem: DEM, path: str | PathLike[str]) -> None:
         },
         "numbers": {_key(name): kind(getattr(dem, name)) for name, kind in _NUMBERS.items()},
     }
-    arrays: dict[str, Any] = {_key(name): getattr(dem, name) for name in _ARRAYS}
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, header=np.array(json.dumps(header)), **arrays)
+    return {"header": np.array(json.dumps(header)), **{_key(name): getattr(dem, name) for name in _ARRAYS}}
 
 
 def load(path: str | PathLike[str]) -> DEM:
@@ -105,7 +113,11 @@ def load(path: str | PathLike[str]) -> DEM:
     InputError
         If the file cannot be read, is damaged, of another program, or of a newer format.
     """
-    content = _read(path)
+    return unpack(read(path), path)
+
+
+def unpack(content: dict[str, np.ndarray], path: str | PathLike[str]) -> DEM:
+    """The DEM whose arrays `pack` gave, read from `path`; errors as `load`."""
     try:
         header = json.loads(str(content["header"]))
         if header["format"] != FORMAT:
@@ -176,7 +188,7 @@ def _refuse_runaway(dem: DEM, path: str | PathLike[str]) -> None:
         )
 
 
-def _read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
+def read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
     """Everything in the file, whose checksums hold."""
     try:
         with zipfile.ZipFile(path) as archive:
@@ -229,4 +241,5 @@ def _build(header: dict[str, Any], content: dict[str, np.ndarray]) -> DEM:
         setattr(dem, name, array)
     dem._loads = np.zeros((dem.threads, n, 6))
     dem._wall_loads = np.zeros((dem.threads, 6, 4))
+    dem._halfway = False
     return dem

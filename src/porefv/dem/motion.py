@@ -16,21 +16,24 @@ from porefv.dem.contacts import grain_contacts, wall_contacts
 
 # Why `advance` came back.
 DONE, CROWDED, RUNAWAY = 0, 1, 2
+# Which halves of a step to take: both, contact forces alone, or the motion they cause alone.
+WHOLE, FORCES, MOTION = 0, 1, 2
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def advance(
-    steps, dt, state, inverse_mass, inverse_inertia, applied, gravity, damping,
+    steps, half, dt, state, inverse_mass, inverse_inertia, applied, gravity, damping,
     starts, others, stiffness, shear, touching, shares_of_grains,
     rims, rim_stiffness, rim_shear, rim_touching, rim_shares,
     ratio, friction, wall_friction,
-    places, wall_velocities, targets, top_speeds, gains,
+    places, wall_velocities, targets, top_speeds, gains, wall_yields, wall_thrusts,
     loads, wall_loads, wall_forces, start, wall_start, slack, fastest, work,
 ):  # fmt: skip
     """Take at most so many steps; returns how many were taken, and why no more.
 
     Parameters
     ----------
+    half : WHOLE, or FORCES and then MOTION to see the loads before they move anything, of one step
     state, starts, others, stiffness, shear, touching : see `porefv.dem.contacts`
     rims, rim_stiffness, rim_shear, rim_touching : the same for grains (first column) and walls (second)
     shares_of_grains, rim_shares (s + 1,) : where each share's grains, with their pairs, and rims start
@@ -39,7 +42,10 @@ def advance(
     places (6,), wall_velocities (6, 3) : of the walls ; targets (6,) : stress servo-controlled walls press with, else
         NaN ; top_speeds (6,) ; gains : part of the distance to balance, by the stiffness of a wall's contacts, moved
         in a step
-    loads (s, n, 6), wall_loads (s, 6, 4) : zero on entry and exit ; wall_forces (6, 3) : last force on each wall
+    wall_yields (6,) : what a pressing wall moves outward in a step for each unit of force; set by FORCES
+    wall_thrusts (6,) : outward force on each wall from outside
+    loads (s, n, 6), wall_loads (s, 6, 4) : zero before FORCES and after MOTION ; wall_forces (6, 3) : force of the
+        grains on each wall
     start (n, 3), wall_start (6,) : places at which pairs were listed ; slack : how far grains may have moved since
     fastest : speed at which the motion counts as runaway
     work (3,) : energies added to: dissipated by sliding, put in by walls, taken by damping
@@ -54,34 +60,38 @@ def advance(
     for s in range(shares + 1):
         bounds[s] = n * s // shares
     for step in range(steps):
-        for s in prange(shares):
-            sliding[s] = grain_contacts(
-                shares_of_grains[s], shares_of_grains[s + 1], state, starts, others, stiffness, ratio, friction, dt,
-                shear, touching, loads[s],
-            )  # fmt: skip
-            sliding[s] += wall_contacts(
-                rim_shares[s], rim_shares[s + 1], state, rims, rim_stiffness, ratio, wall_friction, dt,
-                places, wall_velocities, rim_shear, rim_touching, loads[s], wall_loads[s],
-            )  # fmt: skip
-        _move_walls(dt, places, wall_velocities, targets, top_speeds, gains, wall_loads, wall_forces, work)
+        if half != MOTION:
+            for s in prange(shares):
+                sliding[s] = grain_contacts(
+                    shares_of_grains[s], shares_of_grains[s + 1], state, starts, others, stiffness, ratio, friction,
+                    dt, shear, touching, loads[s],
+                )  # fmt: skip
+                sliding[s] += wall_contacts(
+                    rim_shares[s], rim_shares[s + 1], state, rims, rim_stiffness, ratio, wall_friction, dt,
+                    places, wall_velocities, rim_shear, rim_touching, loads[s], wall_loads[s],
+                )  # fmt: skip
+            work[0] += sliding.sum()
+            _weigh_walls(dt, places, targets, top_speeds, gains, wall_loads, wall_forces, wall_yields)
+        if half == FORCES:
+            return 0, DONE
+        _move_walls(dt, places, wall_velocities, targets, wall_yields, wall_thrusts, wall_forces, work)
         for s in prange(shares):
             damped[s], far[s], runaway[s] = _move(
                 bounds[s], bounds[s + 1], dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping,
                 start, fastest,
             )  # fmt: skip
-        reason = _look(sliding, damped, far, runaway, places, wall_start, slack, work)
+        reason = _look(damped, far, runaway, places, wall_start, slack, work)
         if reason != DONE:
             return step + 1, reason
     return steps, DONE
 
 
 @njit(cache=True, nogil=True)
-def _look(sliding, damped, far, runaway, places, wall_start, slack, work):
+def _look(damped, far, runaway, places, wall_start, slack, work):
     """Add up what the shares have found; whether to go on."""
     farthest = 0.0
     lost = False
     for s in range(far.shape[0]):
-        work[0] += sliding[s]
         work[2] += damped[s]
         farthest = max(farthest, far[s])
         lost = lost or runaway[s]
@@ -163,8 +173,8 @@ def _damp(acceleration, velocity, damping, dt):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _move_walls(dt, places, velocities, targets, top_speeds, gains, wall_loads, wall_forces, work):
-    """Walls of given velocity move on; those of given stress towards balance, no faster than their top speed."""
+def _weigh_walls(dt, places, targets, top_speeds, gains, wall_loads, wall_forces, yields):
+    """Forces of the grains on the walls, and how far pressing walls yield, no faster than their top speed."""
     for w in range(6):
         stiffness = 0.0
         for a in range(3):
@@ -175,17 +185,34 @@ def _move_walls(dt, places, velocities, targets, top_speeds, gains, wall_loads, 
                 wall_loads[s, w, a] = 0.0
             stiffness += wall_loads[s, w, 3]
             wall_loads[s, w, 3] = 0.0
-        axis = w // 2
-        sense = 1.0 if w % 2 == 1 else -1.0
-        if not np.isnan(targets[w]):
-            b = 2 * ((axis + 1) % 3)
-            c = 2 * ((axis + 2) % 3)
-            section = (places[b + 1] - places[b]) * (places[c + 1] - places[c])
-            excess = sense * wall_forces[w, axis] - targets[w] * section
-            outward = top_speeds[w] if excess > 0.0 else -top_speeds[w]
+        yields[w] = 0.0
+        excess = abs(wall_excess(w, places, targets, wall_forces))
+        if excess > 0.0:
+            yields[w] = top_speeds[w] / excess
             if stiffness > 0.0:
-                outward = min(max(gains * excess / (stiffness * dt), -top_speeds[w]), top_speeds[w])
-            velocities[w, axis] = sense * outward
+                yields[w] = min(gains / (stiffness * dt), yields[w])
+        elif excess == 0.0 and stiffness > 0.0:  # a wall without a target has NaN
+            yields[w] = gains / (stiffness * dt)
+
+
+@njit(cache=True, nogil=True)
+def wall_excess(w, places, targets, wall_forces):
+    """Outward force on wall w beyond the stress it presses with; NaN where that is not given."""
+    axis = w // 2
+    b = 2 * ((axis + 1) % 3)
+    c = 2 * ((axis + 2) % 3)
+    section = (places[b + 1] - places[b]) * (places[c + 1] - places[c])
+    sense = 1.0 if w % 2 == 1 else -1.0
+    return sense * wall_forces[w, axis] - targets[w] * section
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _move_walls(dt, places, velocities, targets, yields, thrusts, wall_forces, work):
+    """Walls of given velocity move on; those of given stress towards balance."""
+    for w in range(6):
+        if not np.isnan(targets[w]):
+            outward = yields[w] * (wall_excess(w, places, targets, wall_forces) + thrusts[w])
+            velocities[w, w // 2] = outward if w % 2 == 1 else -outward
     for w in range(6):
         places[w] += dt * velocities[w, w // 2]
         for a in range(3):  # the wall does the opposite of what is done on it

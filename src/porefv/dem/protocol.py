@@ -54,12 +54,28 @@ class GrainModel(Protocol):
         """dt [s]."""
         ...
 
-    def apply(self, forces: np.ndarray) -> None:
-        """Forces (n, 3) on the grains besides contacts and weight, from the next step on until changed [N]."""
+    @property
+    def slots(self) -> np.ndarray:
+        """(n,): row of each grain in the arrays of `predict` and `correct`; 0 ... n - 1 where they are in order."""
         ...
 
-    def run(self, steps: int) -> None:
-        """Take so many steps.
+    def predict(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Take the first half of a step: contact forces, but no motion.
+
+        Returns
+        -------
+        velocities (n, 3) array
+            That grains would have after the step [m/s].
+        wall_speeds (6,) array
+            That walls would have, along their outward normals [m/s].
+        mobilities (n,), wall_mobilities (6,) arrays
+            What a force applied over the step adds to them: dt / m for grains, nothing for walls that move on their
+            own [m/(s N)].
+        """
+        ...
+
+    def correct(self, forces: np.ndarray, thrusts: np.ndarray) -> None:
+        """Take the second half: motion, under forces on grains (n, 3) and walls (6,), outward, besides the others [N].
 
         Raises
         ------

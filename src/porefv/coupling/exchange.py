@@ -1,0 +1,122 @@
+"""What moving grains do to pores, and pores to grains: volume rates E ẋ and forces Eᵀ p (C14 eq. 25-26).
+
+One operator E serves for both, so that the work of the fluid on the grains is the work it takes from the pores, to
+the last digit. There are two such operators:
+
+- `facets`: Eᵀ is the force operator S of C12 (eq. 14, 17, 18), so that forces are those of a steady flow. E = Sᵀ is
+  then the rate of the fluid's volume in a pore whose throats move with the mean velocity of the solids around them,
+  each weighted by its wetted surface: what the throat's flow is relative to, by reciprocity.
+- `volumes`: E is the exact derivative of the volume of the pore's cells, solid included; Eᵀ shares the force on a
+  facet equally among its three vertices.
+
+Summed over all pores both are the rate of the box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from porefv.forces import facet_forces
+from porefv.mesh import PoreMesh
+from porefv.tessellation.triangulation import wall_normals
+
+EXCHANGES = ("facets", "volumes")
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """The operator E, cell by cell.
+
+    Attributes
+    ----------
+    rows : (m, 4) int32 array
+        Row of each vertex of each cell in arrays of velocities or forces: grains, then the six walls.
+    gradients : (m, 4, 3) array
+        What a pressure of 1 in the cell does to each vertex [m²].
+    """
+
+    rows: np.ndarray
+    gradients: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: PoreMesh, kind: str, slip: np.ndarray, slots: np.ndarray | None = None) -> Exchange:
+        """The operator of a mesh.
+
+        Parameters
+        ----------
+        mesh : PoreMesh
+        kind : {'facets', 'volumes'}
+        slip : (6,) bool array
+            Walls that do not drag the fluid.
+        slots : (n,) int array, optional
+            Row of each grain, its id by default.
+        """
+        n = mesh.n_spheres
+        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip)
+        number = np.arange(n + 6, dtype=np.int32)
+        if slots is not None:
+            number[:n] = slots
+        return cls(number[mesh.cells], gradients)
+
+    def rates(self, velocities: np.ndarray, wall_velocities: np.ndarray) -> np.ndarray:
+        """(m,): E ẋ of each cell, from velocities (n, 3) of the grains and (6, 3) of the walls [m³/s]."""
+        out = np.zeros(len(self.rows))
+        gather(self.rows, self.gradients, np.arange(len(out)), np.concatenate([velocities, wall_velocities]), out)
+        return out
+
+    def forces(self, pressure: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Eᵀ p: forces on grains (n, 3) and walls (6, 3), from the pressure of each cell (m,) [N]."""
+        out = np.zeros((n + 6, 3))
+        spread(self.rows, self.gradients, np.arange(len(self.rows)), pressure, out)
+        return out[:n], out[n:]
+
+
+def _facet_gradients(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
+    gradients = np.zeros((mesh.n_cells, 4, 3))
+    _gather_facets(mesh.cells, mesh.facet_cells, mesh.facet_vertices, facet_forces(mesh, slip), gradients)
+    faces = mesh.wall_faces
+    on_wall = (mesh.cells[faces.cells] == (mesh.n_spheres + faces.walls)[:, None]).argmax(axis=1)
+    np.add.at(gradients, (faces.cells, on_wall), faces.areas[:, None] * wall_normals()[faces.walls])
+    return gradients
+
+
+@njit(cache=True)
+def _gather_facets(cells, facet_cells, facet_vertices, forces, gradients):
+    """Add to each cell what its facets' unit forces (f, 3, 3) do to its vertices, outward from the cell."""
+    for f in range(facet_cells.shape[0]):
+        for side in range(2):
+            t = facet_cells[f, side]
+            sense = 1.0 if side == 0 else -1.0
+            for v in range(3):
+                for i in range(4):
+                    if cells[t, i] == facet_vertices[f, v]:
+                        for axis in range(3):
+                            gradients[t, i, axis] += sense * forces[f, v, axis]
+
+
+@njit(cache=True, nogil=True)
+def gather(rows, gradients, node, moves, out):
+    """out[node] += Σ gradient · move over each cell's vertices; cells without a node (negative) are left out."""
+    for t in range(rows.shape[0]):
+        if node[t] >= 0:
+            total = 0.0
+            for i in range(4):
+                k = rows[t, i]
+                for axis in range(3):
+                    total += gradients[t, i, axis] * moves[k, axis]
+            out[node[t]] += total
+
+
+@njit(cache=True, nogil=True)
+def spread(rows, gradients, node, pressure, out):
+    """out[vertex] += gradient × pressure[node], over the vertices of each cell that has a node."""
+    for t in range(rows.shape[0]):
+        if node[t] >= 0:
+            p = pressure[node[t]]
+            for i in range(4):
+                k = rows[t, i]
+                for axis in range(3):
+                    out[k, axis] += gradients[t, i, axis] * p
