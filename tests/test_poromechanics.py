@@ -5,12 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
-from porefv import Box, InputError, Packing, PoreMesh
-from porefv.dem import DEM, Material
+from porefv import InputError
 from porefv.poromechanics import (
     consolidation_coefficient,
     critical_gradient,
-    grain_stresses,
     terzaghi_pressure,
     terzaghi_settlement,
 )
@@ -56,20 +54,3 @@ def test_negative_times_are_refused():
 def test_coefficients():
     assert_allclose(consolidation_coefficient(2.3e-6, 5.895e6, 250.0), 0.0542, rtol=1e-3)
     assert_allclose(critical_gradient(0.4, 2600.0, 1000.0), 0.96)
-
-
-def test_stresses_of_the_grains_have_the_stress_of_the_sample_for_mean(reference):
-    dem = DEM(reference("n200_s1"), damping=0.3)
-    dem.run(3000)
-    mesh = PoreMesh(dem.packing, wall_tolerance=0.2)
-    stresses = grain_stresses(dem.contacts, mesh.laguerre_volumes)
-    mean = np.einsum("k,kab->ab", mesh.laguerre_volumes, stresses) / mesh.box.volume
-    assert_allclose(mean, dem.stress, rtol=1e-10, atol=1e-10 * dem.stress[0, 0])
-
-
-def test_a_grain_pressed_between_two_plates_bears_their_stress():
-    r, depth = 0.1, 1e-4
-    dem = DEM(Packing([[0.1, 0.1, r - depth]], [r], Box([0, 0, 0], [0.2, 0.2, 2 * (r - depth)])), Material(young=1e6))
-    stress = grain_stresses(dem.contacts, PoreMesh(dem.packing).laguerre_volumes)[0]
-    assert_allclose(stress[2, 2], 1e6 * r * depth / 0.2**2, rtol=1e-9)
-    assert_allclose(stress - np.diag(np.diag(stress)), 0.0, atol=1e-9)

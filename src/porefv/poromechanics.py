@@ -1,16 +1,17 @@
-"""Terzaghi's consolidation, and coefficients of saturated grains (C14 §2.4, §3, §5)."""
+"""Terzaghi's consolidation, coefficients of saturated grains, and their micromechanics (C14 §2.4, §3, §5)."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from porefv.errors import InputError
+from porefv.micromechanics import cell_strains, grain_strains, grain_stresses, layer_means
 
-if TYPE_CHECKING:
-    from porefv.dem import Contacts
+__all__ = [
+    "cell_strains", "consolidation_coefficient", "critical_gradient", "grain_strains", "grain_stresses", "layer_means",
+    "terzaghi_pressure", "terzaghi_settlement",
+]  # fmt: skip
 
 # Terms after which a series of Terzaghi's has converged to 1e-16 at T >= 1e-4.
 _TERMS = np.arange(400)
@@ -68,30 +69,6 @@ def terzaghi_settlement(time_factor: ArrayLike) -> np.ndarray:
 def consolidation_coefficient(permeability: float, modulus: float, viscosity: float) -> float:
     """C_v = k E_oed / μ, from permeability [m²], oedometric modulus [Pa] and viscosity [Pa s], in m²/s."""
     return permeability * modulus / viscosity
-
-
-def grain_stresses(contacts: Contacts, volumes: np.ndarray) -> np.ndarray:
-    """Mean stress in the Laguerre cell of each grain: Σ x_c ⊗ f_c / V over its contacts (C14 eq. 39).
-
-    Parameters
-    ----------
-    contacts : Contacts
-        Of the grains; points may be measured from anywhere where the grains are in balance.
-    volumes : (n,) array
-        Of the grains' Laguerre cells, `PoreMesh.laguerre_volumes` [m³].
-
-    Returns
-    -------
-    (n, 3, 3) array
-        Positive in compression. Their mean, weighted by volume, is the stress of the sample [Pa].
-    """
-    n = len(volumes)
-    moments = np.einsum("ca,cb->cab", contacts.points, contacts.forces)
-    stresses = np.zeros((n, 3, 3))
-    i, j = contacts.grains.T
-    np.add.at(stresses, i, -moments)
-    np.add.at(stresses, j[j < n], moments[j < n])
-    return stresses / volumes[:, None, None]
 
 
 def critical_gradient(porosity: float, solid_density: float, fluid_density: float) -> float:

@@ -171,7 +171,8 @@ class Coupling:
             moves[-6:] = self.grains.wall_velocities
             moves[_WALL_ROWS, _WALL_AXES] = _OUTWARD * wall_speeds
         with self._timed("pressure"):
-            guess = self._pressure if self._fresh else self._pressure + self._rate
+            # Half of what the last step changed: all of it would pass its noise on.
+            guess = self._pressure + 0.5 * self._rate
             tolerance = min(self.tolerance, _ANEW) if self._fresh else self.tolerance
             pressure, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance)
             self._rate = np.zeros_like(pressure) if self._fresh else pressure - self._pressure

@@ -20,7 +20,7 @@ from porefv.network import Network
 from porefv.pressure import free_network, reached
 from porefv.solvers import Solver
 
-# Part of the drag, lumped on throats, that the preconditioner knows of (benchmarks/coupling.py).
+# Part of the drag, lumped on throats, that the preconditioner knows of.
 _LUMPED = 0.3
 _MOST_ITERATIONS = 2000
 

@@ -23,7 +23,7 @@ SAFETY = 0.5
 # A grain that covers more than this part of the smallest radius in one step has passed others unseen.
 _RUNAWAY = 0.1
 # Part of the way to balance, by the stiffness of its contacts, that a pressing wall moves in one step.
-_GAIN = 0.2
+_GAIN = 0.8
 # Part of the smallest radius that grains may come closer before pairs are listed anew.
 _SKIN = 0.2
 
@@ -601,6 +601,11 @@ class DEM:
         walled = contacts.grains[:, 1] >= len(self)
         np.add.at(forces, contacts.grains[walled, 1] - len(self), -contacts.forces[walled])
         return forces
+
+    @property
+    def last_wall_forces(self) -> np.ndarray:
+        """(6, 3): force of the grains on each wall over the last step, from t - dt to t [N]."""
+        return self._wall_forces.copy()
 
     @property
     def wall_stress(self) -> dict[str, float]:
