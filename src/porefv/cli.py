@@ -1,4 +1,4 @@
-"""The command `porefv`: pack, solve, check, info, plot. Commands import what they need: help comes at once."""
+"""The command `porefv` and its commands, which import what they need: help comes at once."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except PorefvError as error:
         return _fail(str(error), error.exit_status)
-    except KeyboardInterrupt:
-        return _fail("interrupted; nothing was written", 130)
+    except KeyboardInterrupt as interruption:
+        return _fail(str(interruption) or "interrupted; nothing was written", 130)
     except BrokenPipeError:
         # Whoever read our output has gone (porefv info results | head): no complaint on the way out.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -51,6 +51,9 @@ def _fail(message: str, status: int) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
+    from porefv.reference import command as reference
+    from porefv.simulation import command as simulation
+
     parser = argparse.ArgumentParser(
         prog="porefv",
         description="Packings of spheres, and flow through them: permeability, pressures, forces on every grain.",
@@ -68,6 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_run_options(solve, force="replace results that exist")
     solve.set_defaults(command=_solve)
 
+    simulation.register(commands, _add_run_options)
+    reference.register(commands, _add_run_options)
+
     check = commands.add_parser("check", help="validate a scene and its packing without computing")
     check.add_argument("scene", metavar="SCENE.toml", type=Path)
     check.set_defaults(command=_check)
@@ -76,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("results", metavar="RESULTS", type=Path)
     info.set_defaults(command=_info)
 
-    plot = commands.add_parser("plot", help="draw results: grains coloured by force, pores by pressure")
+    plot = commands.add_parser("plot", help="draw results: grains and pores of solve, time series of simulate")
     plot.add_argument("results", metavar="RESULTS", type=Path)
     plot.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
     plot.set_defaults(command=_plot)
@@ -152,10 +158,17 @@ def _info(options: argparse.Namespace) -> None:
 def _plot(options: argparse.Namespace) -> None:
     from porefv.progress import Progress
     from porefv.results import read
-    from porefv.viz import draw
+    from porefv.simulation.ledger import is_simulation
 
     with Progress().stage("drawing"):
-        draw(read(options.results), options.out)
+        if is_simulation(options.results):
+            from porefv.simulation.plot import draw_series
+
+            draw_series(options.results, options.out)
+        else:
+            from porefv.viz import draw
+
+            draw(read(options.results), options.out)
 
 
 def _announce_compilation(progress: Progress) -> None:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -225,12 +224,12 @@ def _scene(top: Table, directory: Path, path: Path | None) -> PackScene:
         raise top.error(given[1], f"[{given[0]}] and [{given[1]}] exclude each other: a packing is made in one way")
     grains = top.table("grains").only("number", "ratio", "diameters", "passing")
     return PackScene(
-        number=_whole(grains, "number", least=1),
+        number=grains.whole("number", least=1),
         sizes=_sizes(grains),
         box=top.table("box").box(lower=(0.0, 0.0, 0.0)),
-        material=_material(top.table("material")),
+        material=read_material(top.table("material")),
         method=_METHODS[given[0]](top.table(given[0])),
-        seed=_whole(top, "seed", least=0, default=0),
+        seed=top.whole("seed", least=0, default=0),
         output=_output(top, directory),
         path=path,
     )
@@ -241,13 +240,14 @@ def _sizes(table: Table) -> UniformSizes | Grading:
     if graded and "ratio" in table.data:
         raise table.error(graded[0], f"{graded[0]} and ratio exclude each other: sizes come from the one or the other")
     if not graded:
-        return _made(table, UniformSizes, ratio=table.number("ratio", 0.5))
-    return _made(table, Grading, diameters=_numbers(table, "diameters"), passing=_numbers(table, "passing"))
+        return table.make(UniformSizes, ratio=table.number("ratio", 0.5))
+    return table.make(Grading, diameters=_numbers(table, "diameters"), passing=_numbers(table, "passing"))
 
 
-def _material(table: Table) -> Material:
+def read_material(table: Table) -> Material:
+    """The table [material]."""
     table.only("young", "stiffness_ratio", "friction_angle", "density")
-    return _made(table, Material, **{key: table.number(key) for key in table.data})
+    return table.make(Material, **{key: table.number(key) for key in table.data})
 
 
 def _cloud(table: Table) -> Cloud:
@@ -296,15 +296,6 @@ def _output(top: Table, directory: Path) -> Path:
     return path
 
 
-def _made(table: Table, kind: Any, **values: Any) -> Any:
-    """An object of a kind; what it refuses is an error of the key it names."""
-    try:
-        return kind(**values)
-    except InputError as error:
-        key = next((key for key in values if str(error).startswith(key)), next(iter(values)))
-        raise table.error(key, str(error)) from None
-
-
 def _part(table: Table, key: str, *default: float) -> float:
     value = table.number(key, *default)
     if not 0.0 < value < 1.0:
@@ -317,13 +308,6 @@ def _unbalanced(table: Table) -> float:
     if not 1.0e-8 <= value < 1.0:
         raise table.error("unbalanced", f"must lie between 1e-8 and 1, not {value!r}")
     return value
-
-
-def _whole(table: Table, key: str, least: int, default: int | None = None) -> int:
-    value = table.number(key) if default is None else table.number(key, default)
-    if value != int(value) or value < least:
-        raise table.error(key, f"expected a whole number, {least} or more, not {table.data[key]!r}")
-    return int(value)
 
 
 def _numbers(table: Table, key: str) -> tuple[float, ...]:

@@ -181,9 +181,9 @@ class Scene(SceneFile):
 def _scene(top: Table, directory: Path, path: Path | None) -> Scene:
     top.only("packing", "box", "fluid", "walls", "mesh", "flow", "output")
     scene = Scene(
-        packing=_packing(top, directory),
+        packing=read_packing_file(top, directory),
         box=top.table("box").box() if "box" in top.data else None,
-        fluid=_fluid(top.table("fluid")),
+        fluid=read_fluid(top.table("fluid")),
         walls=_walls(top.table("walls")),
         mesh=_mesh(top.table("mesh")),
         flow=_flow(top.table("flow")),
@@ -194,21 +194,26 @@ def _scene(top: Table, directory: Path, path: Path | None) -> Scene:
     return scene
 
 
-def _packing(top: Table, directory: Path) -> PackingFile:
+def read_packing_file(top: Table, directory: Path, *others: str) -> PackingFile:
+    """The key `packing`: a path, or a table that may have other keys."""
     if isinstance(top.data.get("packing"), Mapping):
-        table = top.table("packing").only("file", "format")
+        table = top.table("packing").only("file", "format", *others)
         found = PackingFile(directory / table.string("file"), table.string("format", None))
         key = "file"
     else:
         table, key = top, "packing"
         found = PackingFile(directory / top.string("packing"))
-    if not found.file.is_file():
-        what = "is not a file" if found.file.exists() else "does not exist"
-        raise table.error(key, f"{found.file} {what}; paths are relative to the scene file")
+    try:
+        if not found.file.is_file():
+            what = "is not a file" if found.file.exists() else "does not exist"
+            raise table.error(key, f"{found.file} {what}; paths are relative to the scene file")
+    except OSError as error:
+        raise table.error(key, f"{found.file} cannot be read: {error.strerror}") from None
     return found
 
 
-def _fluid(table: Table) -> Fluid:
+def read_fluid(table: Table) -> Fluid:
+    """The table [fluid]."""
     table.only("viscosity", "density")
     given = {key: table.number(key) for key in table.data}
     try:
@@ -226,7 +231,10 @@ def _walls(table: Table) -> Walls:
         wall.flag("slip", False)
         if name == "lateral" and "pressure" in wall.data:
             raise wall.error("pressure", "the lateral walls have none; give it wall by wall (x_min = ...)")
-    return Walls.from_mapping(table.data)
+    try:
+        return Walls.from_mapping(table.data)
+    except InputError as error:
+        raise InputError(f"{table.source}: {error}") from None
 
 
 def _mesh(table: Table) -> MeshOptions:
@@ -240,11 +248,7 @@ def _mesh(table: Table) -> MeshOptions:
 
 def _flow(table: Table) -> FlowOptions:
     table.only("conductance", "alpha", "solver", "tolerance", "gravity")
-    model = table.string("conductance", "hydraulic-radius", choices=MODELS)
-    try:
-        conductance = conductance_model(model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {}))
-    except InputError as error:
-        raise table.error("alpha", str(error)) from None
+    conductance = read_conductance(table)
     tolerance = table.number("tolerance", None)
     if tolerance is not None and not 0.0 < tolerance < 1.0:
         raise table.error("tolerance", f"must lie between 0 and 1, not {tolerance!r}: a bound on the relative residual")
@@ -254,6 +258,15 @@ def _flow(table: Table) -> FlowOptions:
         tolerance=tolerance,
         gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
     )
+
+
+def read_conductance(table: Table) -> ConductanceModel:
+    """The keys `conductance` and `alpha`."""
+    model = table.string("conductance", "hydraulic-radius", choices=MODELS)
+    try:
+        return conductance_model(model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {}))
+    except InputError as error:
+        raise table.error("alpha", str(error)) from None
 
 
 def _output(table: Table, directory: Path) -> Output:

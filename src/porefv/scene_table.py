@@ -47,6 +47,8 @@ class Table:
             return cls(tomllib.loads(text), str(path), text)
         except tomllib.TOMLDecodeError as error:
             raise InputError(_unreadable(path, text, str(error))) from None
+        except RecursionError:
+            raise InputError(f"{path}: not TOML that can be read: it is nested too deeply") from None
 
     def only(self, *known: str, noun: str = "key") -> Table:
         """This table, whose keys are all among those known."""
@@ -62,6 +64,16 @@ class Table:
             raise self.error(key, f"expected a table [{self._full(key)}], not {value!r}")
         return Table(dict(value), self.source, self.text, self._full(key))
 
+    def tables(self, key: str) -> list[Table]:
+        """The tables [[key]] of a list, the first called `key 1`."""
+        values = self.data.get(key, [])
+        if not isinstance(values, list | tuple) or not all(isinstance(value, Mapping) for value in values):
+            raise self.error(key, f"expected a list of tables [[{self._full(key)}]], not {values!r}")
+        return [
+            Table(dict(value), self.source, self.text, f"{self._full(key)} {number}")
+            for number, value in enumerate(values, 1)
+        ]
+
     def string(self, key: str, default: Any = _REQUIRED, choices: Iterable[str] = ()) -> Any:
         """A text, one of the choices if there are any."""
         value = self._get(key, default)
@@ -69,6 +81,8 @@ class Table:
             return value
         if not isinstance(value, str):
             raise self.error(key, f"expected a text in quotes, not {value!r}")
+        if "\0" in value:
+            raise self.error(key, f"a zero byte stands in {value!r}, which no name can hold")
         choices = tuple(choices)
         if choices and value not in choices:
             raise self.error(key, f"unknown {key} '{value}'{suggestion(value, choices)}")
@@ -98,6 +112,28 @@ class Table:
         if value is not default and not _is_number(value):
             raise self.error(key, f"expected a finite number, not {value!r}")
         return value if value is default else float(value)
+
+    def whole(self, key: str, least: int, default: int | None = None) -> int:
+        """A whole number, `least` or more."""
+        value = self.number(key) if default is None else self.number(key, default)
+        if value != int(value) or value < least:
+            raise self.error(key, f"expected a whole number, {least} or more, not {self.data[key]!r}")
+        return int(value)
+
+    def make(self, kind: Any, **values: Any) -> Any:
+        """An object of a kind from values of keys; what it refuses is an error of the key it names."""
+        try:
+            return kind(**values)
+        except InputError as error:
+            key = next((key for key in values if str(error).startswith(key)), next(iter(values)))
+            raise self.error(key, str(error)) from None
+
+    def numbers(self, key: str) -> tuple[float, ...]:
+        """A list of finite numbers."""
+        values = self._get(key, _REQUIRED)
+        if not isinstance(values, list | tuple) or not all(_is_number(x) for x in values):
+            raise self.error(key, f"expected a list of finite numbers such as [0.0, 1.0], not {values!r}")
+        return tuple(float(x) for x in values)
 
     def vector(self, key: str, default: Any = _REQUIRED) -> tuple[float, float, float]:
         """Three finite numbers."""
@@ -169,20 +205,30 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def line_of(text: str, table: str, key: str) -> int | None:
-    """Line of a key of a table in TOML text, counted from 1; else the line of the table; else None."""
-    current, fallback = "", None
+    """Line of a key of a table in TOML text, counted from 1; else of the innermost table around it; else None."""
+    wanted = f"{table}.{key}" if table else key
+    current, lists = "", dict[str, int]()
+    nearest, length = None, 0
     for number, line in enumerate(text.splitlines(), 1):
-        if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
-            current = header[1].replace('"', "").replace(" ", "")
-            if current == (f"{table}.{key}" if table else key):
-                return number
-            fallback = number if current == table else fallback
+        if header := re.match(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]", line):
+            name = header[2].replace('"', "").replace(" ", "")
+            if header[1] == "[[":
+                lists[name] = lists.get(name, 0) + 1
+            # What follows [[stages]] for the second time is in the table `stages 2`.
+            current = path = re.sub(r"^[^.]+", lambda found: _element(found[0], lists), name)
         elif assignment := re.match(r"\s*([\w.\"'-]+)\s*=", line):
             path = ".".join(filter(None, [current, re.sub("[\"']", "", assignment[1])]))
-            if path == (f"{table}.{key}" if table else key):
-                return number
-            fallback = number if path == table else fallback  # an inline table
-    return fallback
+        else:
+            continue
+        if path == wanted:
+            return number
+        if wanted.startswith(f"{path}.") and len(path) > length:
+            nearest, length = number, len(path)
+    return nearest
+
+
+def _element(name: str, lists: Mapping[str, int]) -> str:
+    return f"{name} {lists[name]}" if name in lists else name
 
 
 def _is_number(value: Any) -> bool:
@@ -197,6 +243,7 @@ def _unreadable(path: Path, text: str, message: str) -> str:
     if not found:
         return f"{path}: not TOML: {message}"
     number, column = int(found[1]), int(found[2])
-    line = text.split("\n")[number - 1].rstrip("\r")
-    pointer = " " * (column - 1) + "^"
+    start = max(column - 100, 0)
+    line = text.split("\n")[number - 1].rstrip("\r")[start : column + 100]
+    pointer = " " * (column - 1 - start) + "^"
     return f"{path}, line {number}: not TOML: {message[: found.start()].strip()}\n    {line}\n    {pointer}"

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba import get_num_threads
 
 from porefv.boundary import Walls
 from porefv.conductance import ConductanceModel, HydraulicRadius
@@ -21,6 +22,7 @@ from porefv.errors import InputError
 from porefv.flow import Fluid, throat_conductances
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
+from porefv.threads import threads
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
@@ -29,6 +31,8 @@ SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 _EXPLICIT, _UNSTABLE = 0.1, 1.8
 # Bound on the power's relative error where pressures start anew on another mesh.
 _ANEW = 1e-8
+# Up to so many unknowns threads gain less than waiting for each other costs.
+_ALONE = 30_000
 # Steps between two looks at how far grains have moved.
 _STRIDE = 10
 # The walls in arrays of grains and walls, and the sense of their outward normals.
@@ -89,7 +93,7 @@ class Coupling:
     scheme : str
         That of the current mesh, `auto` resolved.
     drag_number : float or None
-        Of the current mesh, where the scheme asks for it.
+        Of the current mesh, where the scheme asks for it; a lower bound where `auto` has seen enough.
     effort : Effort
 
     Raises
@@ -174,7 +178,8 @@ class Coupling:
             # Half of what the last step changed: all of it would pass its noise on.
             guess = self._pressure + 0.5 * self._rate
             tolerance = min(self.tolerance, _ANEW) if self._fresh else self.tolerance
-            pressure, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance)
+            with threads(1 if len(guess) <= _ALONE else get_num_threads()):
+                pressure, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance)
             self._rate = np.zeros_like(pressure) if self._fresh else pressure - self._pressure
             self._pressure, self._fresh = pressure, False
         with self._timed("forces"):
@@ -264,7 +269,7 @@ class Coupling:
                     )
                 self.scheme = "implicit-drag"
             else:
-                self.drag_number = explicit.drag_number(drag)
+                self.drag_number = explicit.drag_number(drag, _EXPLICIT if asked == "auto" else np.inf)
                 if asked == "auto":
                     self.scheme = "semi-implicit" if self.drag_number <= _EXPLICIT else "implicit-drag"
                 elif self.drag_number > _UNSTABLE:

@@ -79,6 +79,8 @@ class PoreFluid:
         self.free = np.isnan(held_pressures(mesh, pressures))
         number = np.where(self.free, np.cumsum(self.free) - 1, -1).astype(np.int32)
         self._node = number[mesh.cell_pore]
+        free = int(np.count_nonzero(self.free))
+        self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
         # What walls yielded when the factor was made; empty before.
         self.factor_mobilities = np.zeros(0)
         self._factor: ApproximateCholesky | None = None
@@ -93,6 +95,7 @@ class PoreFluid:
         self.network, self._inflow = free_network(
             pairs, self.conductances, self._held, self.free, np.zeros(mesh.n_pores)
         )
+        self._weights = 1.0 / self.network.diagonal
         held_cell = np.where(self._node < 0, mesh.cell_pore, -1)
         self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
         spread(self.exchange.rows, self.exchange.gradients, held_cell, self._held, self._held_forces)
@@ -130,14 +133,14 @@ class PoreFluid:
         gather(self.exchange.rows, self.exchange.gradients, self._node, moved, rhs)
         np.subtract(self._inflow, rhs, out=rhs)
         x = guess.copy()
-        q, aq, z, room = np.empty((4, len(x)))
-        forces = np.empty((len(self.mobilities) + 6, 3))
+        q, aq, z, room = self._room
         arguments = (
             self.exchange.rows, self.exchange.gradients, self._node, self.network.starts, self.network.columns,
-            self.network.links, self.network.leaks, self.mobilities, wall_mobilities, forces,
+            self.network.links, self.network.leaks, self.mobilities, wall_mobilities, self._room_for_forces,
         )  # fmt: skip
         _multiply(*arguments, x, aq)
         r = rhs - aq
+        size = _weighted_square(r, self._weights)
         rz = self._factor.apply(r, z, room)
         q[:] = z
         iterations = 0
@@ -145,6 +148,10 @@ class PoreFluid:
         while rz > tolerance**2 * abs(_dot(x, rhs)) and iterations < _MOST_ITERATIONS:
             iterations += 1
             _advance(x, r, q, aq, rz / _multiply(*arguments, q, aq))
+            before, size = size, _weighted_square(r, self._weights)
+            if rz * size / before <= tolerance**2 * abs(_dot(x, rhs)):
+                # By the diagonal so much less is left that the factor, which costs most, need not be asked.
+                return x, iterations
             new = self._factor.apply(r, z, room)
             _redirect(q, z, new / rz)
             rz = new
@@ -219,8 +226,8 @@ class PoreFluid:
         """Number of free pores from which no throat leads out."""
         return int(np.count_nonzero(~reached(self.mesh.throats.pores, self.conductances, ~self.free)))
 
-    def drag_number(self, mobilities: np.ndarray) -> float:
-        """Largest eigenvalue of D Eᵀ G⁻¹ E, to 1 %, for these mobilities (n,).
+    def drag_number(self, mobilities: np.ndarray, enough: float = np.inf) -> float:
+        """Largest eigenvalue of D Eᵀ G⁻¹ E, to 1 %, for these mobilities (n,); a lower bound where that is `enough`.
 
         A step that is explicit in the drag is stable up to 2.
         """
@@ -237,7 +244,7 @@ class PoreFluid:
             spread(self.exchange.rows, self.exchange.gradients, self._node, pressure, forces)
             size = float(np.sqrt((moves[:-6] ** 2 / root**2).sum()))
             before, largest = largest, float(np.sqrt((forces[:-6] ** 2 * root**2).sum())) / size
-            if abs(largest - before) <= 1e-3 * largest:
+            if abs(largest - before) <= 1e-3 * largest or largest > enough:
                 break
             moves[:-6] = root**2 * forces[:-6] / largest
         return largest
@@ -280,6 +287,14 @@ def _dot(a, b):
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _weighted_square(r, weights):
+    total = 0.0
+    for i in range(r.shape[0]):
+        total += weights[i] * r[i] * r[i]
     return total
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -215,10 +216,14 @@ def _read_pvd(directory: Path, series: str) -> dict[int, float]:
 
 
 def _write_pvd(directory: Path, series: str, frames: dict[int, float]) -> None:
-    with atomic_write(directory / f"{series}.pvd") as temporary, temporary.open("w", encoding="utf-8") as file:
+    write_list(directory / f"{series}.pvd", {_name(series, step): time for step, time in frames.items()})
+
+
+def write_list(path: Path, frames: Mapping[str, float]) -> None:
+    """Write a .pvd: the time of each file beside it [s]."""
+    with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n')
         file.writelines(
-            f'<DataSet timestep="{time!r}" part="0" file="{_name(series, step)}"/>\n'
-            for step, time in sorted(frames.items())
+            f'<DataSet timestep="{time!r}" part="0" file="{name}"/>\n' for name, time in sorted(frames.items())
         )
         file.write("</Collection>\n</VTKFile>\n")
