@@ -139,14 +139,14 @@ def fluid_forces(
 
 
 def facet_forces(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
-    """(f, 3, 3): force on each vertex of each facet for a unit of pressure drop across it: A^k n + A^f n γ^k/Σγ [m²]."""
+    """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, A^k n + A^f n γ^k/Σγ [m²]."""
     vectors, shares = _drag(mesh, slip)
     sectors = mesh.throats.facet_sectors[:, :, None] * mesh.throats.facet_normals[:, None, :]
     return sectors + shares[:, :, None] * vectors[:, None, :]
 
 
 def _drag(mesh: PoreMesh, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Viscous force (f, 3) for a unit of pressure drop, A^f n of the facet's throat, and its vertices' shares (f, 3)."""
+    """Viscous force (f, 3) for a unit pressure drop, A^f n of the facet's throat, and its vertices' shares (f, 3)."""
     throats = mesh.throats
     weights = throats.facet_wetted_surfaces(slip)
     sums = throats.total_by_facet(_positive_sum(weights))

@@ -7,6 +7,7 @@ adds to them: dt / m for a grain. With D = 0 and velocities of half a step ago t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
@@ -20,9 +21,14 @@ from porefv.network import Network
 from porefv.pressure import free_network, reached
 from porefv.solvers import Solver
 
+if TYPE_CHECKING:
+    from scipy import sparse
+
 # Part of the drag, lumped on throats, that the preconditioner knows of.
 _LUMPED = 0.3
 _MOST_ITERATIONS = 2000
+# Drag that rules the matrix by this factor takes iterations in hundreds: up to so many unknowns factorise it instead.
+_RULING, _FACTORED = 300.0, 15_000
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ class PoreFluid:
         self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
         # What walls yielded when the factor was made; empty before.
         self.factor_mobilities = np.zeros(0)
-        self._factor: ApproximateCholesky | None = None
+        self._factor: ApproximateCholesky | DragFactor | None = None
         self.set_pressures(pressures)
 
     def set_pressures(self, pressures: np.ndarray) -> None:
@@ -126,7 +132,7 @@ class PoreFluid:
         if self._factor is None:
             if len(self.factor_mobilities) == 0:
                 self.factor_mobilities = wall_mobilities.copy()
-            self._factor = self._preconditioner(self.factor_mobilities)
+            self._factor = self._make_factor(self.factor_mobilities)
         moved = velocities.copy()
         _yield(self._held_forces, self.mobilities, wall_mobilities, moved)
         rhs = np.zeros(len(self.network))
@@ -162,25 +168,41 @@ class PoreFluid:
             )
         return x, iterations
 
-    def _preconditioner(self, wall_mobilities: np.ndarray) -> ApproximateCholesky:
-        """Factor of the network with a part of the drag in its throats, and joined to a leak."""
+    def _make_factor(self, wall_mobilities: np.ndarray) -> ApproximateCholesky | DragFactor:
+        """Of the matrix itself where drag rules it, else of the network with a part of the drag in its throats."""
         mesh = self.mesh
         drags = np.zeros(mesh.n_spheres + 6)
         drags[mesh.cells.ravel()] = np.append(self.mobilities, np.zeros(6))[self.exchange.rows.ravel()]
         vertices = mesh.facet_vertices[mesh.throats.first_facets]
-        lumped = _LUMPED * drags[vertices].sum(axis=1) * (mesh.throats.areas / 3.0) ** 2
+        drag = drags[vertices].sum(axis=1) * (mesh.throats.areas / 3.0) ** 2
+        nothing = np.zeros(mesh.n_pores)
+        weights = self.conductances + _LUMPED * drag
+        network, _ = free_network(mesh.throats.pores, weights, nothing, self.free, nothing)
         # Walls yield to the pressure on all of them: what each face has of it, lumped.
         faces = mesh.wall_faces
         node = self._node[faces.cells]
         sections = np.repeat([mesh.box.section(axis) for axis in range(3)], 2)
         yielding = faces.areas * (wall_mobilities * sections)[faces.walls]
-        nothing = np.zeros(mesh.n_pores)
-        network, _ = free_network(mesh.throats.pores, self.conductances + lumped, nothing, self.free, nothing)
         leaks = np.bincount(node[node >= 0], yielding[node >= 0], len(network))
         if not (leaks.any() or network.leaks.any()):  # pressures are defined up to a constant: any will do
             leaks[0] = network.diagonal[0]
+        if len(network) <= _FACTORED and np.median(drag) > _RULING * np.median(self.conductances):
+            return DragFactor(self._drag_matrix() + _diagonal(leaks) + self.network.to_matrix())
         leaks, diagonal = network.leaks + leaks, network.diagonal + leaks
         return ApproximateCholesky.of(Network(network.starts, network.columns, network.links, leaks, diagonal))
+
+    def _drag_matrix(self) -> sparse.csr_array:
+        """E D Eᵀ of the grains, between free pores."""
+        from scipy import sparse
+
+        n, used = len(self.mobilities), self._node >= 0
+        vertices = self.exchange.rows[used]
+        columns = (3 * vertices[:, :, None] + np.arange(3)).ravel()
+        rows = np.repeat(self._node[used], 12)
+        shape = len(self.network), 3 * (n + 6)
+        operator = sparse.csr_array((self.exchange.gradients[used].ravel(), (rows, columns)), shape=shape)
+        mobilities = np.repeat(np.append(self.mobilities, np.zeros(6)), 3)
+        return (operator @ sparse.diags_array(mobilities) @ operator.T).tocsr()
 
     # ---- what follows from the pressures ------------------------------------------------------------------------
 
@@ -248,6 +270,33 @@ class PoreFluid:
                 break
             moves[:-6] = root**2 * forces[:-6] / largest
         return largest
+
+
+def _diagonal(values: np.ndarray) -> sparse.dia_array:
+    from scipy import sparse
+
+    return sparse.diags_array(values)
+
+
+class DragFactor:
+    """Sparse factor of G + E D Eᵀ as a preconditioner: pores couple through every grain, so it fills."""
+
+    def __init__(self, matrix: sparse.csr_array):
+        from scipy import sparse
+        from scipy.sparse.linalg import splu
+
+        self.scale = 1.0 / np.sqrt(matrix.diagonal())
+        scale = sparse.diags_array(self.scale)
+        self.factor = splu(
+            (scale @ matrix @ scale).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )  # fmt: skip
+
+    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+        """z = A⁻¹ r; returns r·z. `y` is room to work in."""
+        np.multiply(self.scale, r, out=y)
+        np.multiply(self.scale, self.factor.solve(y), out=z)
+        return _dot(r, z)
 
 
 @njit(cache=True, nogil=True)
