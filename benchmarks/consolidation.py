@@ -221,6 +221,7 @@ def main() -> None:
     parser.add_argument("--grains", type=int, nargs="+", default=[500, 1000, 2000, 5000])
     parser.add_argument("--stress", type=float, default=10e3, help="of the plate in the test [Pa]")
     parser.add_argument("--store", type=Path, default=Path("consolidation"), help="directory for runs")
+    parser.add_argument("--exchange", default="facets", help="facets or volumes")
     parser.add_argument("--out", type=Path, help="picture to draw")
     parser.add_argument("--plain", action="store_true", help="without the correction of the ends, too")
     options = parser.parse_args()
@@ -228,7 +229,8 @@ def main() -> None:
     corrected = {}
     for grains in options.grains:
         for ends in (True, False) if options.plain else (True,):
-            run = consolidation(grains, options.stress, options.store, end_correction=ends)
+            other = {} if options.exchange == "facets" else {"exchange": options.exchange}
+            run = consolidation(grains, options.stress, options.store, end_correction=ends, **other)
             run["dry"]["initial_modulus"] = dry(grains, 1.1 * CONFINEMENT, options.store)["gauged_modulus"]
             run["flow"]["after"] = run["dry"]["permeability_after"]
             flow, moduli = run["flow"], run["dry"]

@@ -444,3 +444,9 @@ def test_the_page_names_every_key_and_column_and_its_scenes_are_sound():
     assert scenes
     for text in scenes:
         SimulationScene.from_mapping(tomllib.loads(text), directory=ROOT / "data" / "scenes")
+
+
+@pytest.mark.parametrize("name", ["oedometer", "triaxial", "permeameter", "pack_dense", "pack_settled"])
+def test_check_validates_every_kind_of_scene(name, capsys):
+    assert main(["check", str(ROOT / "data" / "scenes" / f"{name}.toml")]) == 0
+    assert "in a box of" in capsys.readouterr().out

@@ -53,6 +53,7 @@ def _fail(message: str, status: int) -> int:
 def _parser() -> argparse.ArgumentParser:
     from porefv.reference import command as reference
     from porefv.simulation import command as simulation
+    from porefv.trade import command as trade
 
     parser = argparse.ArgumentParser(
         prog="porefv",
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
 
     simulation.register(commands, _add_run_options)
     reference.register(commands, _add_run_options)
+    trade.register(commands, _add_run_options)
 
     check = commands.add_parser("check", help="validate a scene and its packing without computing")
     check.add_argument("scene", metavar="SCENE.toml", type=Path)
@@ -137,22 +139,44 @@ def _solve(options: argparse.Namespace) -> None:
 
 def _check(options: argparse.Namespace) -> None:
     from porefv.progress import Progress
-    from porefv.report import scene_text
-    from porefv.scene import Scene
+    from porefv.scene_table import Table
 
-    scene = Scene.read(options.scene)
     progress = Progress()
     _announce_compilation(progress)
-    with progress.stage("validation"):
-        packing = scene.check()
-    print(scene_text(scene, packing))
+    keys = Table.read(options.scene).data
+    if "stages" in keys:
+        from porefv.simulation.command import described
+        from porefv.simulation.scene import SimulationScene
+
+        simulation = SimulationScene.read(options.scene)
+        with progress.stage("validation"):
+            grains = simulation.check()
+        print(described(simulation, grains))
+    elif "grains" in keys:
+        from porefv.pack_scene import PackScene
+
+        print(PackScene.read(options.scene).described)
+    else:
+        from porefv.report import scene_text
+        from porefv.scene import Scene
+
+        scene = Scene.read(options.scene)
+        with progress.stage("validation"):
+            packing = scene.check()
+        print(scene_text(scene, packing))
 
 
 def _info(options: argparse.Namespace) -> None:
     from porefv.report import summary_text
     from porefv.results import read
+    from porefv.simulation.ledger import is_simulation, read_ledger
 
-    print(summary_text(read(options.results)))
+    if is_simulation(options.results):
+        from porefv.simulation.command import outcome
+
+        print(outcome(read_ledger(options.results), options.results))
+    else:
+        print(summary_text(read(options.results)))
 
 
 def _plot(options: argparse.Namespace) -> None:

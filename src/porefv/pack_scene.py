@@ -111,6 +111,13 @@ class PackScene(SceneFile):
         """Stages of `pack`, in order."""
         return ("packing", "writing")
 
+    @property
+    def described(self) -> str:
+        """What `porefv check` says of it."""
+        size = " × ".join(f"{length:g}" for length in self.box.size)
+        method = type(self.method).__name__.lower()
+        return f"{counted(self.number, 'grain')} in a box of {size} m by {method}, seed {self.seed}, to {self.output}"
+
     def pack(self, *, force: bool = False, progress: PackProgress | None = None) -> Packing:
         """Make the packing, and write its file with what it is and how it was made.
 

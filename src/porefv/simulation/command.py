@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from porefv.dem import DEM
     from porefv.simulation.ledger import Ledger
+    from porefv.simulation.scene import SimulationScene
 
 
 def register(commands: Any, add_run_options: Callable[..., None]) -> None:
@@ -53,3 +55,24 @@ def outcome(ledger: Ledger, directory: Path) -> str:
             f"{found['when']} {found['stage']}"
         )
     return "\n".join([*lines, f"results in {directory}"])
+
+
+def described(scene: SimulationScene, grains: DEM) -> str:
+    """What `porefv check` says of a simulation."""
+    from porefv.errors import counted
+
+    size = " × ".join(f"{length:g}" for length in grains.box.size)
+    lines = [
+        f"{counted(len(grains), 'grain')} in a box of {size} m, porosity {grains.porosity:.4f}, "
+        f"{grains.coordination:.1f} contacts a grain",
+        f"steps of {grains.step:.3g} s; results to {scene.output.directory}",
+    ]
+    for number, stage in enumerate(scene.stages, 1):
+        end = f"{stage.end:g} s" if isinstance(stage.end, float) else "until at rest"
+        plates = ", ".join(
+            f"{wall} {f'presses with {plate.stress:g} Pa' if plate.stress is not None else 'moves'}"
+            for wall, plate in stage.plates.items()
+        )
+        what = "with fluid" if stage.fluid else "dry"
+        lines.append(f"  {number}. {stage.name}: {what}, {end}{f'; {plates}' if plates else ''}")
+    return "\n".join(lines)

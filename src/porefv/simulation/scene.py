@@ -13,6 +13,7 @@ from porefv.coupling import EXCHANGES, SCHEMES
 from porefv.dem import DEM, Material, Plate
 from porefv.errors import InputError
 from porefv.flow import Fluid
+from porefv.mesh import PoreMesh
 from porefv.pack_scene import read_material
 from porefv.packing import WALLS, Box, Packing
 from porefv.scene import PackingFile, read_conductance, read_fluid, read_packing_file
@@ -185,6 +186,22 @@ class SimulationScene(SceneFile):
             )
         packing = Packing(self.scale * found.centres, self.scale * found.radii, box, found.source)
         return DEM(packing, self.material, gravity=self.gravity, step=self.step)
+
+    def check(self) -> DEM:
+        """Read and validate everything `run` would, moving nothing; the grains.
+
+        Raises
+        ------
+        InputError
+            As `run`, save that results may exist.
+        """
+        from porefv.simulation.ledger import check_directory
+
+        check_directory(self.output.directory, force=True)
+        grains = self.grains()
+        if any(stage.fluid for stage in self.stages):
+            PoreMesh(grains.packing)
+        return grains
 
     def run(self, *, force: bool = False, resume: bool = False, progress: SimulationProgress | None = None) -> Path:
         """Go through the stages, writing results on the way; see `porefv.simulation.run.simulate`."""

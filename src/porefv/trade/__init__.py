@@ -1,0 +1,1 @@
+"""Accuracy against time and memory, on a scene of the user's."""
