@@ -12,6 +12,14 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.packing import WALLS
 
+# Sizes of pressures, viscosities, densities and accelerations, such that no product of them leaves double precision.
+LEAST, MOST = 1e-60, 1e60
+
+
+def within_range(value: float) -> bool:
+    """Whether a positive number can be computed with."""
+    return LEAST <= value <= MOST
+
 
 @dataclass(frozen=True)
 class Wall:
@@ -34,6 +42,10 @@ class Wall:
                 raise InputError(f"a wall's pressure must be a number in pascals, not {self.pressure!r}")
             if not math.isfinite(self.pressure):
                 raise InputError(f"a wall's pressure must be finite, not {self.pressure!r}")
+            if self.pressure != 0.0 and not within_range(abs(self.pressure)):
+                raise InputError(
+                    f"a wall's pressure must be 0 or of size {LEAST:g} to {MOST:g} Pa, not {self.pressure!r}"
+                )
         if not isinstance(self.slip, (bool, np.bool_)):
             raise InputError(f"a wall's slip must be true or false, not {self.slip!r}")
 

@@ -1,23 +1,39 @@
 """Conjugate gradients on a network, in fused kernels, judged by the flow that the nodes fail to conserve.
 
+`conjugate_gradients` finds pressures in double precision. `refined` finds them as the sum of two doubles each: stiff
+throats then pass flows that differences of single doubles could not tell from nothing.
+
 Sums run over blocks of fixed size, so that results do not depend on the number of threads.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Protocol
+
 import numpy as np
 from numba import get_num_threads, njit, prange
 
-from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.network import Network
 from porefv.threads import threads
 
 _BLOCK = 16384
+# By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
+_REACH = 1e-10
 _MAX_ITERATIONS = 500
+_EPSILON = float(np.finfo(float).eps)
 # Iterations between two looks at what the tolerance is measured against.
 _LOOK_EVERY = 4
 # Up to so many unknowns threads gain less than waiting for each other costs; on a busy machine it costs most of all.
 _ALONE = 30_000
+
+
+class Preconditioner(Protocol):
+    """What nearly inverts a network."""
+
+    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+        """z = M⁻¹ r; returns r·z. `y`, (n,), is room to work in."""
+        ...
 
 
 def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -31,13 +47,13 @@ def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, 
 
 def _measures(network, rhs, x):
     flow, size = _flow_and_size(network.leaks, network.diagonal, rhs, x)
-    return 0.5 * flow, float(np.finfo(float).eps) * size
+    return 0.5 * flow, _EPSILON * size
 
 
 def conjugate_gradients(
     network: Network,
     rhs: np.ndarray,
-    preconditioner: ApproximateCholesky,
+    preconditioner: Preconditioner,
     tolerance: float,
     guess: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
@@ -81,6 +97,122 @@ def _iterate(a, rhs, preconditioner, tolerance, guess):
                 break
             _redirect(p, z, new / rz)
             rz = new
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Pressures as sums of two doubles, and how exact they are.
+
+    Attributes
+    ----------
+    x, rest : (n,) arrays
+        Pressures, and what rounding has left of them [Pa].
+    iterations : int
+    lost, flow : float
+        Σ|b - A x|, and half of all that enters or leaves [m³/s].
+    error : float
+        Estimate of the largest error of a pressure: what A⁻¹ makes of |b - A x| [Pa].
+    """
+
+    x: np.ndarray
+    rest: np.ndarray
+    iterations: int
+    lost: float
+    flow: float
+    error: float
+
+
+def refined(
+    network: Network,
+    held: np.ndarray,
+    sources: np.ndarray,
+    preconditioner: Preconditioner,
+    tolerance: float,
+    accuracy: float,
+) -> Refined:
+    """Iterate until Σ|b - A x| is below `tolerance` times the flow and the error of pressures below `accuracy`.
+
+    Parameters
+    ----------
+    network : Network
+    held : (n,) array
+        Pressure that each node's leaks lead to [Pa].
+    sources : (n,) array
+        Volume injected into each node per unit time [m³/s].
+    preconditioner : ApproximateCholesky or DirectFactor
+    tolerance : float
+    accuracy : float
+        [Pa]
+
+    Returns
+    -------
+    Refined
+        Its best, whether or not it meets both.
+    """
+    with threads(1 if len(network) <= _ALONE else get_num_threads()):
+        x, rest = np.zeros((2, len(network)))
+        total, best = 0, None
+        while True:
+            r = network.split_residual(held, sources, x, rest)
+            flow = 0.5 * float(np.abs(network.leaks * ((held - x) - rest)).sum() + np.abs(sources).sum())
+            lost = float(np.abs(r).sum())
+            error = np.inf
+            if lost <= tolerance * flow:
+                error = _largest_error(preconditioner, r)
+            if best is None or lost < best.lost:
+                best = Refined(x, rest, total, lost, flow, error)
+            stalled = lost > 0.5 * best.lost and best.iterations < total
+            # Where nothing flows there is nothing to be relative to: two doubles hold no better.
+            exact = lost <= _EPSILON**2 * float(network.diagonal @ np.abs(x))
+            if (lost <= tolerance * flow and error <= accuracy) or stalled or exact or total >= _MAX_ITERATIONS:
+                break
+            correction, iterations = _correction(
+                network, held, sources, x, rest, r, preconditioner, tolerance if error == np.inf else 0.0
+            )
+            total += iterations
+            rest = rest + correction
+            larger = x + rest  # the sum of both, and exactly what rounding it leaves
+            part = larger - x
+            x, rest = larger, (x - (larger - part)) + (rest - part)
+        if best.error == np.inf:
+            r = network.split_residual(held, sources, best.x, best.rest)
+            best = replace(best, error=_largest_error(preconditioner, r))
+        return replace(best, iterations=total)
+
+
+def _largest_error(preconditioner: Preconditioner, r: np.ndarray) -> float:
+    z, room = np.empty((2, len(r)))
+    preconditioner.apply(np.abs(r), z, room)
+    return float(np.abs(z).max(initial=0.0))
+
+
+def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
+    """What to add to the pressures, from their residual r: to the tolerance, or as far as one residual reaches."""
+    d = np.zeros(len(a))
+    z, ap, room = np.empty((3, len(a)))
+    r = r.copy()
+    rz = preconditioner.apply(r, z, room)
+    p = z.copy()
+    least = _REACH * float(np.abs(r).sum())
+    enough = least
+    iterations = 0
+    while iterations < _MAX_ITERATIONS:
+        iterations += 1
+        power = _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
+        if not power > 0.0:  # what is left is no number any more, or the factor is spoilt
+            break
+        lost = _advance(d, r, p, ap, rz / power)
+        if iterations % _LOOK_EVERY == 0:
+            flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
+            enough = max(least, 0.5 * tolerance * flow)
+        if lost <= enough:
+            break
+        new = preconditioner.apply(r, z, room)
+        if not new > 0.0:
+            break
+        _redirect(p, z, new / rz)
+        rz = new
+    return d, iterations
 
 
 @njit(cache=True, parallel=True)

@@ -61,9 +61,10 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
     shortest = np.finfo(float).eps * float(mesh.packing.radii.min())
     lengths = np.maximum(throats.lengths, shortest)
     lengths *= viscosity
-    conductances = np.divide(conductivity, lengths, out=lengths)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
+        conductances = np.divide(conductivity, lengths, out=lengths)
     conductances[(conductivity <= 0.0) | throats.closed] = 0.0
-    return conductances
+    return _finite(conductances, f"conductances of {model.name}")
 
 
 def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
@@ -288,6 +289,7 @@ class PoreFlow:
                 self.walls.slip,
                 reference=self._reference,
                 weight=self.fluid.density * self.gravity,
+                shares=getattr(self.conductance, "shares", "surface"),
             )
             _finite(forces.total, "forces")
             return forces
@@ -313,7 +315,7 @@ def _finite(values: np.ndarray, what: str) -> np.ndarray:
     """The values, or a ComputationError if any is not finite: nothing else leaves the flow."""
     bad = np.count_nonzero(~np.isfinite(values))
     if bad:
-        raise ComputationError(f"{bad} of {values.size} {what} are not finite numbers; nothing can be said of this flow")
+        raise ComputationError(f"{bad} of {values.size} {what} are not finite numbers; nothing can be said of the flow")
     return values
 
 

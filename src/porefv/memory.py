@@ -9,6 +9,7 @@ from porefv.errors import ComputationError
 
 # Peak resident size of a flow with forces, measured by benchmarks/scale.py: about 6 pores a sphere, 0.8 kB a pore.
 BYTES_PER_SPHERE = 5_500
+BYTES_PER_CELL = 800
 _LOADED = 200 * 2**20  # Python, numpy, scipy, numba and the kernels
 
 
@@ -29,6 +30,17 @@ def available() -> int | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def ensure_cells(cells: int) -> None:
+    """Raise a ComputationError if a triangulation of more than so many cells leaves no memory for the flow."""
+    have, need = available(), BYTES_PER_CELL * cells
+    if have is not None and need > have:
+        raise ComputationError(
+            f"these spheres make more than {cells} pores, which need {need / 2**30:.1f} GiB of memory, "
+            f"{have / 2**30:.1f} GiB are free: spheres in lines or on a surface may make as many as the square of "
+            "their number; use a part of the packing"
+        )
 
 
 def ensure(spheres: int) -> None:

@@ -12,6 +12,7 @@ from porefv import memory
 from porefv.cells import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_gradients
 from porefv.errors import InputError
 from porefv.facets import enumerate_facets, laguerre_volumes, unite
+from porefv.flat_cells import settle_flat_cells
 from porefv.packing import Box, Packing
 from porefv.tessellation import RegularTriangulation
 from porefv.tessellation.triangulation import wall_normals
@@ -171,15 +172,17 @@ class PoreMesh:
         upper = self.box.upper - self.triangulation.origin
         return np.concatenate([self.packing.radii, np.stack([-lower, upper], axis=1).ravel()])
 
-    @property
+    @cached_property
     def local_vertices(self) -> np.ndarray:
-        """(m, 3): Laguerre vertex of each cell, from the local origin [m]."""
-        return self.triangulation.local_vertices
+        """(m, 3): Laguerre vertex of each cell from the local origin, that of a flat cell being a neighbour's [m]."""
+        vertices = self.triangulation.local_vertices.copy()
+        settle_flat_cells(self.cells, self.neighbours, self.local_points, self.n_spheres, vertices)
+        return vertices
 
-    @property
+    @cached_property
     def vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex (power centre) of each cell [m]."""
-        return self.triangulation.vertices
+        return self.local_vertices + self.triangulation.origin
 
     @cached_property
     def cell_volumes(self) -> np.ndarray:

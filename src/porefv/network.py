@@ -67,6 +67,12 @@ class Network:
         residual(self.starts, self.columns, self.links, self.leaks, rhs, x, out)
         return out
 
+    def split_residual(self, held: np.ndarray, sources: np.ndarray, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """b - A (x + rest), b = leaks held + sources: from differences of both parts of the pressures."""
+        out = np.empty(len(self))
+        split_residual(self.starts, self.columns, self.links, self.leaks, held, sources, x, rest, out)
+        return out
+
     def to_matrix(self) -> sparse.csr_array:
         """A as a scipy matrix."""
         from scipy import sparse
@@ -113,4 +119,15 @@ def residual(starts, columns, links, leaks, rhs, x, out):
         s = rhs[i] - leaks[i] * x[i]
         for k in range(starts[i], starts[i + 1]):
             s -= links[k] * (x[i] - x[columns[k]])
+        out[i] = s
+
+
+@njit(cache=True, parallel=True)
+def split_residual(starts, columns, links, leaks, held, sources, x, rest, out):
+    """out = leaks held + sources - A (x + rest)."""
+    for i in prange(leaks.shape[0]):
+        s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            s -= links[k] * ((x[i] - x[j]) + (rest[i] - rest[j]))
         out[i] = s

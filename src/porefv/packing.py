@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.box import WALLS, Box, read_only
-from porefv.errors import InputError, counted, vector
+from porefv.errors import ComputationError, InputError, counted, vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -19,6 +19,10 @@ Ints = NDArray[np.int32]
 __all__ = ["WALLS", "Box", "Overlaps", "Packing", "Source", "cap_volume", "lens_volume"]
 
 _MOST_SHOWN = 5  # culprits listed in one error
+
+# Lengths whose sixth powers a double holds, which is what the geometry of throats multiplies; and the smallest radius,
+# relative to the box, whose place in it rounding leaves.
+SHORTEST, LONGEST, FINEST = 1e-30, 1e30, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,9 +187,43 @@ class Packing:
         return float(balls.sum() - lenses.sum() - caps.sum())
 
     @cached_property
+    def _triples(self) -> tuple[int, float]:
+        from porefv.triples import triple_overlaps
+
+        found = self.overlaps
+        i, j = found.pairs.T
+        lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
+        crossings, caps = np.zeros((2, len(self), 6))
+        crossings[found.wall_spheres, found.wall_ids] = found.wall_depths
+        caps[found.wall_spheres, found.wall_ids] = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        return triple_overlaps(found.pairs, self.centres, self.radii, lenses, crossings, caps)
+
+    @property
+    def triple_overlaps(self) -> int:
+        """Number of triples, of spheres or of spheres and walls, with a point in common; if any, volumes are bounds."""
+        return int(self._triples[0])
+
+    @property
+    def porosity_error(self) -> float:
+        """By how much `porosity` may exceed the true one: what triples share, at most; 0 where there are none."""
+        return float(self._triples[1]) / self._require_box().volume
+
+    @cached_property
     def porosity(self) -> float:
-        """Fraction of the box outside the spheres."""
-        return 1.0 - self.solid_volume / self._require_box().volume
+        """Fraction of the box outside the spheres; where three meet in a point, no less than that (`porosity_error`).
+
+        Raises
+        ------
+        ComputationError
+            If spheres overlap so deeply that sums over pairs say less than nothing.
+        """
+        porosity = 1.0 - self.solid_volume / self._require_box().volume
+        if not -1e-9 <= porosity <= 1.0 and self.triple_overlaps:
+            raise ComputationError(
+                f"{self._path()}spheres overlap so deeply, {self.triple_overlaps} triples of them in common points, "
+                "that their volume cannot be told from that of pairs. Make their radii smaller."
+            )
+        return porosity
 
     def validate(self, wall_tolerance: float = 0.05) -> Packing:
         """Check that the spheres fit one another and the box.
@@ -212,6 +250,19 @@ class Packing:
         if not wall_tolerance >= 0:
             raise InputError(f"wall_tolerance must be a number >= 0, not {wall_tolerance}.")
         box = self._require_box()
+        if not (SHORTEST <= box.size.min() and box.size.max() <= LONGEST):
+            raise InputError(
+                f"{self._path()}the box has sides {vector(box.size)} m; they must lie between {SHORTEST:g} and "
+                f"{LONGEST:g} m. Give lengths in another unit."
+            )
+        finest = FINEST * box.size.max()
+        self._refuse(
+            np.flatnonzero((self.radii < finest) | (self.radii > LONGEST)),
+            f"radius not between {finest:.3g} m, which is {FINEST:g} of the box, and {LONGEST:g} m",
+            "sphere",
+            lambda i: f"{self._name(i)}: radius {self.radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
         distances = self._wall_distances()
         nearest = distances.argmin(axis=1)
         beyond = self.radii - distances.min(axis=1)

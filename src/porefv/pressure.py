@@ -10,7 +10,7 @@ from numba import njit
 
 from porefv.errors import ComputationError
 from porefv.network import Network
-from porefv.solvers import TOLERANCE, SolverReport, solve
+from porefv.solvers import TOLERANCE, SolverReport, solve_split
 from porefv.union_find import join
 
 
@@ -25,11 +25,14 @@ class PressureSolution:
     isolated : (n_pores,) bool array
         Pores from which no flow reaches a pore of imposed pressure.
     report : SolverReport
+    rest : (n_pores,) array
+        What rounding has left of each pressure: differences of `pressure` plus those of `rest` drive the fluxes [Pa].
     """
 
     pressure: np.ndarray
     isolated: np.ndarray
     report: SolverReport
+    rest: np.ndarray
 
 
 def solve_network(
@@ -77,7 +80,8 @@ def solve_network(
         raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
 
     pressure = np.where(free, 0.0, fixed)
-    pressure, report = _solve_free(pairs, conductances, pressure, free & ~isolated, sources, solver, tolerance)
+    rest = np.zeros(n)
+    report = _solve_free(pairs, conductances, pressure, rest, free & ~isolated, sources, solver, tolerance)
     if isolated.any():
         cut_off = ~reached(pairs, np.ones(len(pairs)), ~free)
         if cut_off.any():
@@ -87,10 +91,8 @@ def solve_network(
             )
         weights = np.ones(len(pairs)) if links is None else links()
         touching = isolated[pairs].any(axis=1)
-        pressure, _ = _solve_free(
-            pairs[touching], weights[touching], pressure, isolated, np.zeros(n), "direct", tolerance
-        )
-    return PressureSolution(pressure, isolated, report)
+        _solve_free(pairs[touching], weights[touching], pressure, rest, isolated, np.zeros(n), "auto", tolerance)
+    return PressureSolution(pressure, isolated, report, rest)
 
 
 @njit(cache=True)
@@ -111,13 +113,26 @@ def reached(pairs, weights, sources):
     return found
 
 
-def _solve_free(pairs, conductances, pressure, free, sources, solver, tolerance):
-    """Pressures with those of the free pores solved for, all others held."""
+def _solve_free(pairs, conductances, pressure, rest, free, sources, solver, tolerance):
+    """Solve for the pressures of the free pores, in place; all others are held."""
     network, rhs = free_network(pairs, conductances, pressure, free, sources)
-    x, report = solve(network, rhs, solver, tolerance)
-    solved = pressure.copy()
-    solved[free] = x
-    return solved, report
+    held = _held_beside(pairs, conductances, pressure, free, (rhs - sources[free]), network.leaks)
+    solution = solve_split(network, held, sources[free], solver, tolerance)
+    pressure[free] = solution.pressure
+    rest[free] = solution.rest
+    return solution.report
+
+
+def _held_beside(pairs, conductances, pressure, free, inflow, leaks):
+    """(number of free pores,): mean pressure of the held pores beside each free one, exact where they are equal."""
+    number = np.cumsum(free) - 1
+    lowest, highest = np.full(len(leaks), np.inf), np.full(len(leaks), -np.inf)
+    for a, b in (pairs.T, pairs.T[::-1]):
+        beside = free[a] & ~free[b] & (conductances > 0.0)
+        np.minimum.at(lowest, number[a[beside]], pressure[b[beside]])
+        np.maximum.at(highest, number[a[beside]], pressure[b[beside]])
+    mean = np.divide(inflow, leaks, out=np.zeros(len(leaks)), where=leaks > 0.0)
+    return np.where(lowest == highest, lowest, mean)
 
 
 def free_network(

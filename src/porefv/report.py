@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from porefv import memory
+from porefv.errors import InputError
 from porefv.packing import WALLS
 
 if TYPE_CHECKING:
@@ -62,7 +63,21 @@ def outcome(results: Results) -> str:
 
 
 def summary_text(results: Results) -> str:
-    """The numbers of a results directory, in paragraphs."""
+    """The numbers of a results directory, in paragraphs.
+
+    Raises
+    ------
+    InputError
+        If the summary lacks what every summary has.
+    """
+    try:
+        return _summary_text(results)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise InputError(f"{results.directory}: summary.json is damaged: {reason}. Solve again.") from None
+
+
+def _summary_text(results: Results) -> str:
     summary = results.summary
     packing, mesh, unusual = summary["packing"], summary["mesh"], summary.get("unusual", {})
     paragraphs: list[tuple[str, list[tuple[str, Any]]]] = [

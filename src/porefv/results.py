@@ -39,6 +39,7 @@ QUANTITIES = ("permeability", "pressure", "forces")
 FILES = ("summary.json", "forces.csv", "pores.vtu", "spheres.vtp", "throats.vtp")
 
 _PARTS = ("pressure", "viscous", "buoyancy", "total")
+_COLUMNS = ("id", "x", "y", "z", "radius", *(f"{part}_{axis}" for part in _PARTS for axis in "xyz"))
 
 
 # ---- computing and writing -----------------------------------------------------------------------------
@@ -102,18 +103,17 @@ def check_target(directory: str | PathLike[str], *, vtk: bool) -> None:
 
         vtk_data_model()
     directory = Path(directory)
-    if directory.is_dir():
-        try:
-            content = sorted(os.listdir(directory))
-        except OSError as error:
-            raise InputError(f"cannot write {directory}: {error.strerror}.") from None
-        foreign = [name for name in content if name not in FILES]
-        if "summary.json" in content and foreign:
-            raise InputError(
-                f"{directory} holds {foreign[0]}, which is not a file of the results, and would be lost. "
-                "Move it, or choose another directory."
-            )
-    existing = next(parent for parent in directory.absolute().parents if parent.exists())
+    try:
+        content = sorted(os.listdir(directory)) if directory.is_dir() else []
+        existing = next(parent for parent in directory.absolute().parents if parent.exists())
+    except OSError as error:
+        raise InputError(f"cannot write {directory}: {error.strerror}.") from None
+    foreign = [name for name in content if name not in FILES]
+    if "summary.json" in content and foreign:
+        raise InputError(
+            f"{directory} holds {foreign[0]}, which is not a file of the results, and would be lost. "
+            "Move it, or choose another directory."
+        )
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         raise InputError(f"cannot write {directory}: {existing} is not a directory that may be written to.")
 
@@ -168,7 +168,6 @@ def save(
 
 def _write_forces(flow: PoreFlow, path: Path) -> None:
     packing, box, forces = flow.mesh.packing, flow.mesh.box, flow.forces
-    columns = [f"{part}_{axis}" for part in _PARTS for axis in "xyz"]
     middle = 0.5 * (box.lower + box.upper)
     positions = np.tile(middle, (6, 1))
     for wall in range(6):
@@ -176,7 +175,7 @@ def _write_forces(flow: PoreFlow, path: Path) -> None:
     on_spheres = np.column_stack([packing.centres, packing.radii, *(getattr(forces, part) for part in _PARTS)]) + 0.0
     on_walls = np.column_stack([positions, *(getattr(forces, f"wall_{part}") for part in _PARTS)]) + 0.0  # no -0.0
     with path.open("w", encoding="utf-8") as file:
-        file.write(",".join(["id", "x", "y", "z", "radius", *columns]) + "\n")
+        file.write(",".join(_COLUMNS) + "\n")
         # repr gives the shortest text that reads back to the same number.
         file.writelines(f"{k},{','.join(map(repr, row))}\n" for k, row in enumerate(on_spheres.tolist()))
         for name, row in zip(WALLS, on_walls.tolist(), strict=True):
@@ -237,10 +236,16 @@ class Results:
             If forces were not asked for.
         """
         path = self._file("forces.csv", 'add "forces" to the quantities')
-        with path.open(encoding="utf-8") as file:
-            _, *numbers = file.readline().rstrip().split(",")
-        columns = [("id", "U16"), *((name, float) for name in numbers)]
-        return np.genfromtxt(path, delimiter=",", skip_header=1, dtype=columns, encoding="utf-8")
+        try:
+            header, *lines = path.read_text(encoding="utf-8").splitlines()
+            if header != ",".join(_COLUMNS):
+                raise ValueError("its first line does not name the columns")
+            rows = [_force_row(number, line) for number, line in enumerate(lines, 2)]
+            if [row[0] for row in rows[-6:]] != list(WALLS):
+                raise ValueError("it does not end with the six walls")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} is damaged: {error}. Solve again.") from None
+        return np.array(rows, dtype=[("id", "U16"), *((name, float) for name in _COLUMNS[1:])])
 
     @cached_property
     def pores(self) -> pyvista.UnstructuredGrid:
@@ -272,6 +277,18 @@ class Results:
         return pyvista.read(path)
 
 
+def _force_row(number: int, line: str) -> tuple[Any, ...]:
+    """A line of forces.csv: name and numbers."""
+    name, *cells = line.split(",")
+    if name in WALLS and len(cells) > 3 and cells[3] == "":
+        cells[3] = "nan"
+    elif "nan" in cells:
+        raise ValueError(f"line {number} lacks a number")
+    if len(cells) != len(_COLUMNS) - 1:
+        raise ValueError(f"line {number} has {len(cells) + 1} cells instead of {len(_COLUMNS)}")
+    return name, *map(float, cells)
+
+
 def read(directory: str | PathLike[str]) -> Results:
     """Read a results directory: its summary now, the rest when asked for.
 
@@ -284,7 +301,7 @@ def read(directory: str | PathLike[str]) -> Results:
     path = directory / "summary.json"
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else f"summary.json is damaged ({error})"
         raise InputError(f"{directory} holds no results of porefv solve: {reason}") from None
     if not isinstance(summary, dict) or "packing" not in summary:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from porefv.approximate_cholesky import ApproximateCholesky
-from porefv.conjugate_gradients import conjugate_gradients, imbalance
+from porefv.conjugate_gradients import conjugate_gradients, imbalance, refined
 from porefv.errors import ComputationError, InputError
 from porefv.network import Network
 
@@ -17,6 +17,10 @@ SOLVERS = ("auto", "direct", "cg")
 
 # What all pores together may fail to conserve, relative to the flow.
 TOLERANCE = 1e-10
+
+# Largest error of a pressure, relative to the range of those imposed, or the tolerance where that is larger: pores
+# behind a nearly closed throat have such errors.
+PRESSURE_TOLERANCE = 1e-8
 
 # Up to so many unknowns a factorisation costs no more than the iterations it saves, over one solution and over many
 # (benchmarks/solvers.py).
@@ -40,6 +44,8 @@ class SolverReport:
     floor : float
         The least imbalance that pressures kept in double precision can be asked to have.
     seconds : float
+    pressure_error : float
+        Estimate of the largest error of a pressure, relative to the range of the held ones; NaN where not asked for.
     """
 
     name: str
@@ -49,6 +55,7 @@ class SolverReport:
     imbalance: float
     floor: float
     seconds: float
+    pressure_error: float = float("nan")
 
 
 class Solver:
@@ -137,6 +144,83 @@ class Solver:
         return x, report
 
 
+@dataclass(frozen=True)
+class SplitSolution:
+    """Pressures (n,) as sums of two doubles, so that the flow through the stiffest throat is in their differences."""
+
+    pressure: np.ndarray
+    rest: np.ndarray
+    report: SolverReport
+
+
+def solve_split(
+    network: Network, held: np.ndarray, sources: np.ndarray, solver: str = "auto", tolerance: float = TOLERANCE
+) -> SplitSolution:
+    """Solve A x = leaks held + sources to the tolerance, however far apart conductances are.
+
+    Where rounding of its factor leaves `direct` short of that, `auto` goes on with `cg`.
+
+    Parameters
+    ----------
+    network : Network
+    held : (n,) array
+        Pressure that each node's leaks lead to [Pa].
+    sources : (n,) array
+        Volume injected into each node per unit time [m³/s].
+    solver, tolerance
+        See `Solver`.
+
+    Raises
+    ------
+    InputError, ComputationError
+        As `Solver.solve`; also if pressures cannot be told to `PRESSURE_TOLERANCE` of their range.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
+    begin = time.perf_counter()
+    ready = Solver(network, solver)
+    n = len(network)
+    values = held[network.leaks > 0.0]
+    span = float(np.ptp(values)) if len(values) else 0.0
+    if n == 0 or (span == 0.0 and not sources.any()):  # nothing is driven
+        pressure = np.full(n, values[0] if n else 0.0)
+        report = SolverReport(ready.name, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin, 0.0)
+        return SplitSolution(pressure, np.zeros(n), report)
+    accuracy = max(PRESSURE_TOLERANCE, tolerance) * span if span > 0.0 and not sources.any() else np.inf
+    found = None
+    for name in dict.fromkeys((ready.name, "cg") if solver == "auto" else (ready.name,)):
+        try:
+            factor = Solver(network, name)._factor
+        except ComputationError:  # singular, or by rounding as good as that
+            continue
+        found = refined(network, held, sources, factor, tolerance, accuracy)
+        if found.lost <= tolerance * found.flow and found.error <= accuracy:
+            break
+    if found is None:
+        raise ComputationError(
+            "the network is singular: a part of it is not joined to any imposed pressure, or by conductances "
+            "too many decades below its own"
+        )
+    reached = found.lost / found.flow if found.flow > 0.0 else 0.0
+    if not reached <= tolerance:
+        if _driven(network, network.leaks * held + sources):
+            raise ComputationError(
+                f"the {name} solver stopped at a flux imbalance of {reached:.1e} after {found.iterations} iterations "
+                f"(asked: {tolerance:.1e}): conductances differ by too many decades, leave out spheres that are much "
+                "smaller than the rest; or try another solver, or a larger tolerance"
+            )
+        reached = 0.0  # equal pressures: nothing flows but what rounding makes
+    if not found.error <= accuracy:
+        raise ComputationError(
+            f"pressures are uncertain by {found.error / span:.1e} of their range: some pores are joined to the rest by "
+            "conductances too many decades below their own; leave out spheres that are much smaller than the rest"
+        )
+    error = found.error / span if span > 0.0 else float("nan")
+    seconds = time.perf_counter() - begin
+    report = SolverReport(name, n, found.iterations, tolerance, reached, 0.0, seconds, error)
+    return SplitSolution(found.x, found.rest, report)
+
+
 def solve(
     network: Network, rhs: np.ndarray, solver: str = "auto", tolerance: float = TOLERANCE
 ) -> tuple[np.ndarray, SolverReport]:
@@ -177,6 +261,12 @@ class DirectFactor:
             raise ComputationError(
                 "the network is singular: a part of it is not joined to any imposed pressure"
             ) from None
+
+    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+        """z = A⁻¹ r but for rounding; returns r·z. The same as `ApproximateCholesky.apply`."""
+        np.multiply(self.scale, r, out=y)
+        np.multiply(self.scale, self.factor.solve(y), out=z)
+        return float(r @ z)
 
     def solve(self, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
         """x (n,), refined until its imbalance is below the tolerance, and the number of refinements."""

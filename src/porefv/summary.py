@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import porefv
+from porefv.errors import ComputationError
 from porefv.packing import WALLS
 
 if TYPE_CHECKING:
@@ -61,7 +62,10 @@ def summary_json(
         "versions": _versions(vtk),
         "units": UNITS,
     }
-    text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
+    try:
+        text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
+    except ValueError:
+        raise ComputationError("a result is not a finite number, and nothing was written") from None
     # Vectors on one line. Strings hold no line breaks in JSON, so that none is met here.
     return re.sub(r"\[\n\s+([^][{}]*?)\n\s+\]", _on_one_line, text) + "\n"
 
@@ -76,9 +80,11 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "spheres": len(packing),
         "hidden_spheres": len(mesh.triangulation.hidden),
         "overlapping_pairs": len(packing.overlaps.pairs),
+        "overlapping_triples": packing.triple_overlaps,
         "radii": [packing.radii.min(), packing.radii.max()],
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
+        "porosity_error": packing.porosity_error,
         "pore_volume": packing.porosity * mesh.box.volume,
     }
 
@@ -129,6 +135,7 @@ def _unusual(flow: PoreFlow) -> dict[str, int]:
     """Counts of throats and pores that need a rule of their own, by what has been computed of them."""
     throats = flow.mesh.throats
     counts = {
+        "pores_of_several_pressures": flow.pores_of_several_pressures,
         "closed_throats": throats.closed,
         "throats_without_length": throats.lengths <= 0.0,
         "throats_without_conductance": flow.conductances == 0.0,
@@ -136,7 +143,10 @@ def _unusual(flow: PoreFlow) -> dict[str, int]:
     }
     if "volumes" in vars(throats):  # the conductance model has asked for them
         counts["throats_without_volume"] = throats.volumes <= 0.0
-        counts["throats_without_surface"] = throats.wetted_surfaces(flow.walls.slip) <= 0.0
+        surfaces = throats.wetted_surfaces(flow.walls.slip)
+        counts["throats_without_surface"] = surfaces <= 0.0
+        # No passage in a box has a hydraulic radius as large as the box: the spheres beside it are dust.
+        counts["throats_wider_than_the_box"] = throats.volumes > np.maximum(surfaces, 0.0) * flow.mesh.box.size.min()
     return {name: int(np.count_nonzero(found)) for name, found in counts.items()}
 
 

@@ -27,7 +27,7 @@ _PLAIN, _SCALED = ("{}", "{}u"), ("{}s", "{}su")
 def read(path: AnyPath) -> Packing:
     """Read a data file or a dump, told apart by their content; errors name the file and the line."""
     lines = read_lines(path)
-    first = next(line for line in lines if line.strip())
+    first = next((line for line in lines if line.strip()), "")
     return _read_dump(path, lines) if first.startswith("ITEM:") else _read_data(path, lines)
 
 

@@ -4,6 +4,9 @@ The radius is point data named radius, radii or r, or diameter, in any case. Fie
 ``box_upper`` give the box. Cells are not read.
 """
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,21 @@ from porefv.packing import Box, Packing, Source
 
 _HALVES = {"radius": 1.0, "radii": 1.0, "r": 1.0, "diameter": 0.5, "diameters": 0.5}
 _CORNERS = ("box_lower", "box_upper")
+
+# Reads a file in no more memory than an honest one of its size takes.
+_TRIAL = """
+import os, sys
+from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
+try:
+    import resource
+    room = 2**32 + 100 * os.path.getsize(sys.argv[1])
+    resource.setrlimit(resource.RLIMIT_AS, (room, room))
+except (ImportError, OSError, ValueError):
+    pass
+reader = vtkXMLGenericDataObjectReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+"""
 
 
 def read(path: AnyPath) -> Packing:
@@ -43,8 +61,17 @@ def write(packing: Packing, path: AnyPath) -> None:
     if packing.box is not None:
         for name, corner in zip(_CORNERS, (packing.box.lower, packing.box.upper), strict=True):
             points.field_data[name] = np.array(corner)
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    # Into memory first: on a full disk VTK crashes, and Python with it.
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(points)
+    writer.SetDataModeToBinary()
+    writer.SetWriteToOutputString(True)
     with atomic_write(path) as temporary:
-        points.save(temporary)
+        if not writer.Write():
+            raise OSError("VTK could not write the points")
+        temporary.write_text(writer.GetOutputString(), encoding="utf-8")
 
 
 def _read_mesh(path: AnyPath) -> Any:
@@ -55,6 +82,10 @@ def _read_mesh(path: AnyPath) -> Any:
     if not content[:100].lstrip().startswith((b"<?xml", b"<VTKFile")):
         raise InputError(f"{path}: not a VTK file (legacy .vtk, or XML .vtp or .vtu).")
     pyvista = _pyvista("Reading VTK files")
+    # A damaged size makes VTK ask for more memory than there is, and that ends the process: let it be another one.
+    trial = subprocess.run([sys.executable, "-c", _TRIAL, os.fspath(path)], capture_output=True, check=False)
+    if trial.returncode != 0:
+        raise InputError(f"{path}: cannot be read as VTK (its reader breaks down). Is the file damaged?")
     # pyvista.read would repeat on the terminal what VTK says about a bad file.
     from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
 

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import get_num_threads, njit
 
+from porefv import memory
 from porefv.tessellation import insertion
 from porefv.tessellation.ordering import rounds
 
@@ -77,6 +78,7 @@ def _build(n, points, weights, extent):
         )  # fmt: skip
         if done == n:
             break
+        memory.ensure_cells(len(cells))
         cells, neighbours, planes, bounds, marks, ends, free = (
             np.concatenate([a, np.zeros_like(a)]) for a in (cells, neighbours, planes, bounds, marks, ends, free)
         )

@@ -1,0 +1,463 @@
+"""What must hold at the extremes: of contrast, size, place, overlap, memory, and of files half written."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from porefv import memory, results
+from porefv.boundary import Wall, Walls
+from porefv.conductance import EffectiveRadius, HydraulicRadius
+from porefv.errors import ComputationError, InputError
+from porefv.flow import Fluid, PoreFlow
+from porefv.mesh import PoreMesh
+from porefv.packing import Box, Packing
+from porefv.pressure import free_network, solve_network
+from porefv.tessellation import RegularTriangulation
+
+UNIT = Box([0, 0, 0], [1, 1, 1])
+PACKINGS = Path(__file__).parent.parent / "data" / "packings"
+
+
+def resized(packing, factor):
+    return Packing(packing.centres, packing.radii * factor, packing.box)
+
+
+def scaled(packing, length, order=slice(None)):
+    box = Box([0] * 3, packing.box.size * length)
+    return Packing(packing.centres[order] * length, packing.radii[order] * length, box)
+
+
+# ---- contrast ------------------------------------------------------------------------------------------------
+
+
+def with_fines(packing, ratio, count=60):
+    """Fines at random in the voids, smaller than the smallest grain by the ratio."""
+    rng = np.random.default_rng(0)
+    radius = packing.radii.min() / ratio
+    places = []
+    while len(places) < count:
+        place = rng.uniform(radius, 1 - radius, 3)
+        if (np.linalg.norm(packing.centres - place, axis=1) > packing.radii + radius).all():
+            places.append(place)
+    return Packing(np.vstack([packing.centres, places]), np.append(packing.radii, np.full(count, radius)), packing.box)
+
+
+@pytest.mark.parametrize("ratio", [10, 1e3, 1e4])
+def test_fines_that_float_in_voids_lose_no_digits(reference, ratio):
+    # Their throats conduct up to 10^20 times as well as those between grains: differences of single doubles are noise.
+    packing = with_fines(reference("n54_s1"), ratio)
+    order = np.random.default_rng(1).permutation(len(packing))
+    flow, copy = (PoreFlow(p, Walls.along("y"), Fluid(1.0)) for p in (packing, scaled(packing, 0.3, order)))
+    assert flow.solver_report.imbalance <= 1e-10
+    assert flow.imbalance <= 1e-10
+    assert flow.forces.conservation_residual <= 1e-12
+    assert_allclose(copy.permeability / 0.3**2, flow.permeability, rtol=1e-10)
+    largest = np.abs(flow.forces.total).max()
+    assert_allclose(copy.forces.total / 0.3**2, flow.forces.total[order], rtol=0, atol=1e-8 * largest)
+
+
+def exact_solution(pairs, conductances, fixed):
+    """Pressures of a network in rational numbers, by elimination."""
+    from fractions import Fraction
+
+    n = len(fixed)
+    free = [i for i in range(n) if np.isnan(fixed[i])]
+    row = {i: k for k, i in enumerate(free)}
+    a = [[Fraction(0)] * (len(free) + 1) for _ in free]
+    for (i, j), k in zip(pairs.tolist(), conductances.tolist(), strict=True):
+        for u, v in ((i, j), (j, i)):
+            if u in row:
+                a[row[u]][row[u]] += Fraction(k)
+                if v in row:
+                    a[row[u]][row[v]] -= Fraction(k)
+                else:
+                    a[row[u]][-1] += Fraction(k) * Fraction(float(fixed[v]))
+    for k in range(len(free)):
+        for r in range(k + 1, len(free)):
+            factor = a[r][k] / a[k][k]
+            if factor:
+                a[r] = [x - factor * y for x, y in zip(a[r], a[k], strict=True)]
+    x = [Fraction(0)] * len(free)
+    for k in reversed(range(len(free))):
+        x[k] = (a[k][-1] - sum(a[k][c] * x[c] for c in range(k + 1, len(free)))) / a[k][k]
+    pressure = [Fraction(0) if np.isnan(p) else Fraction(float(p)) for p in fixed]
+    for i, value in zip(free, x, strict=True):
+        pressure[i] = value
+    return pressure
+
+
+@pytest.mark.parametrize("solver", ["auto", "cg"])
+@pytest.mark.parametrize("decades", [12, 20, 28])
+def test_flow_and_pressures_are_those_of_rational_numbers_whatever_the_contrast(solver, decades):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        n = 18
+        tree = np.stack([np.arange(1, n), (rng.random(n - 1) * np.arange(1, n)).astype(int)], axis=1)
+        pairs = np.concatenate([tree, rng.integers(0, n, (n, 2))])
+        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+        k = 10.0 ** rng.uniform(-decades, 0, len(pairs))
+        fixed = np.full(n, np.nan)
+        fixed[[0, n - 1]] = 1.0, 0.0
+        exact = exact_solution(pairs, k, fixed)
+        found = solve_network(pairs, k, fixed, solver=solver)
+        assert found.report.imbalance <= 1e-10 and found.report.pressure_error <= 1e-8
+        # Pores behind the least of conductances, too, and so none outside of what is imposed.
+        assert_allclose(found.pressure, [float(p) for p in exact], rtol=0, atol=1e-8)
+        inflow = exact_flow = 0.0
+        for (i, j), kij in zip(pairs.tolist(), k.tolist(), strict=True):
+            if 0 in (i, j):
+                sense = 1.0 if i == 0 else -1.0
+                inflow += sense * kij * ((found.pressure[i] - found.pressure[j]) + (found.rest[i] - found.rest[j]))
+                exact_flow += sense * kij * float(exact[i] - exact[j])
+        assert_allclose(inflow, exact_flow, rtol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["auto", "direct", "cg"])
+def test_parts_that_lead_from_nowhere_to_nowhere_have_the_pressure_of_their_end(solver):
+    # A closed throat between two chains, each held at one end: nothing flows, and there is nothing to be relative to.
+    pairs = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [6, 7]])
+    k = np.array([1.0, 1e-5, 3e-4, 0.0, 2e-6, 1.0, 7.0])
+    fixed = np.array([1.0, *[np.nan] * 6, 0.3])
+    found = solve_network(pairs, k, fixed, solver=solver)
+    assert_allclose(found.pressure, [1.0] * 4 + [0.3] * 4, rtol=1e-15)
+    assert found.report.imbalance == 0.0
+
+
+@pytest.mark.parametrize("name", ["sc8", "n25_s1", "n54_s1", "n200_s1"])
+def test_the_matrix_is_symmetric_and_positive_definite(reference, name):
+    flow = PoreFlow(reference(name), Walls.along("y"), Fluid(1.0))
+    fixed = flow.imposed_pressures
+    free = np.isnan(fixed) & ~flow.solution.isolated
+    network, _ = free_network(
+        flow.mesh.throats.pores, flow.conductances, np.nan_to_num(fixed), free, np.zeros(len(fixed))
+    )
+    matrix = network.to_matrix().toarray()
+    np.testing.assert_array_equal(matrix, matrix.T)
+    scale = 1 / np.sqrt(np.diag(matrix))
+    assert np.linalg.eigvalsh(scale[:, None] * matrix * scale).min() > 0.0
+
+
+# ---- lattices and mirror images ------------------------------------------------------------------------------
+
+
+def nudged(packing, size):
+    moved = packing.centres + size * np.random.default_rng(0).uniform(-1, 1, packing.centres.shape)
+    return Packing(moved, packing.radii, packing.box)
+
+
+@pytest.mark.parametrize("kind", ["sc", "bcc", "fcc", "hcp"])
+@pytest.mark.parametrize("nudge", [1e-16, 1e-14, 1e-12, 1e-10])
+def test_a_lattice_that_rounding_has_bent_has_the_permeability_of_the_exact_one(lattice, unit_flow, kind, nudge):
+    exact = unit_flow(PoreMesh(lattice(kind, 3)), Walls.along("y"))
+    bent = unit_flow(PoreMesh(nudged(lattice(kind, 3), nudge)), Walls.along("y"))
+    # Flat cells between the halves of a square have no say: one throat it is, as before.
+    assert bent.mesh.n_pores == exact.mesh.n_pores
+    assert_allclose(bent.permeability, exact.permeability, rtol=10 * nudge + 1e-12)
+    copy = unit_flow(PoreMesh(scaled(bent.mesh.packing, 0.3)), Walls.along("y"))  # bent otherwise by rounding
+    assert_allclose(copy.permeability / 0.3**2, bent.permeability, rtol=1e-11)
+    assert_allclose(copy.forces.total / 0.3**2, bent.forces.total, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind, jump", [("sc", 8e-3), ("bcc", 3e-8), ("fcc", 4e-5), ("hcp", 2e-5)])
+def test_a_lattice_that_is_bent_in_earnest_jumps_to_another_permeability_once(lattice, kind, jump):
+    # From the tolerance of ties on, squares are triangles with a flat cell between, each a throat of its own.
+    exact, *bent = (PoreFlow(nudged(lattice(kind, 3), x), Walls.along("y")).permeability for x in (0.0, 1e-7, 1e-6))
+    assert_allclose(bent, exact, rtol=jump + 3e-5)
+
+
+@pytest.mark.parametrize("tiles", [(2, 1, 1), (1, 2, 1), (2, 2, 2), (3, 1, 2)])
+def test_mirror_images_between_walls_of_symmetry_have_the_permeability_of_one(reference, tiles):
+    packing = reference("n25_s1")
+    copies = [np.where(np.array(t) % 2 == 1, 1 - packing.centres, packing.centres) + t for t in np.ndindex(tiles)]
+    many = Packing(np.concatenate(copies), np.tile(packing.radii, len(copies)), Box([0] * 3, tiles))
+    walls = Walls.along("y", slip=True)
+    one, all_of_them = PoreFlow(packing, walls), PoreFlow(many, walls)
+    assert_allclose(all_of_them.permeability, one.permeability, rtol=1e-9)
+    assert all_of_them.solver_report.imbalance <= 1e-10
+
+
+# ---- one more grain ------------------------------------------------------------------------------------------
+
+# How much a grain may raise the permeability: nothing, if throats were Stokes problems. To the models of conductance
+# dust in a pore makes throats shorter, and hardly narrower (docs/extremes.md).
+RISE = {HydraulicRadius: 0.03, EffectiveRadius: 0.03}
+
+
+def widest_pore(packing):
+    mesh = PoreMesh(packing)
+    places = mesh.vertices[((mesh.vertices > 0) & (mesh.vertices < 1)).all(axis=1)]
+    gaps = np.minimum(places, 1 - places).min(axis=1)
+    for centre, radius in zip(packing.centres, packing.radii, strict=True):
+        gaps = np.minimum(gaps, np.linalg.norm(places - centre, axis=1) - radius)
+    return places[gaps.argmax()], gaps.max()
+
+
+@pytest.mark.parametrize("model", RISE)
+@pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "n200_s1"])
+def test_one_more_grain_lowers_the_permeability(reference, name, model):
+    packing = reference(name)
+    place, widest = widest_pore(packing)
+    before = PoreFlow(packing, Walls.along("y"), conductance=model()).permeability
+    for size in (0.01, 0.1, 0.5, 1.0):
+        more = Packing(np.vstack([packing.centres, place]), np.append(packing.radii, size * widest), packing.box)
+        after = PoreFlow(more, Walls.along("y"), conductance=model()).permeability
+        assert after < before * (1.0 + (RISE[model] if size < 1.0 else 0.0))
+
+
+@pytest.mark.parametrize("model", RISE)
+def test_larger_grains_lower_the_permeability(reference, model):
+    packing = reference("n200_s1")
+    k = [
+        PoreFlow(resized(packing, f), Walls.along("y"), conductance=model()).permeability
+        for f in (0.5, 0.7, 0.9, 0.99, 1.0, 1.01, 1.03)
+    ]
+    assert (np.diff(k) < 0.0).all()
+
+
+# ---- overlap -------------------------------------------------------------------------------------------------
+
+
+def counted_porosity(packing, m=60):
+    """By counting the points of a grid, within about 1/m² of the truth."""
+    axis = (np.arange(m) + 0.5) / m
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    void = np.ones(len(grid), bool)
+    for centre, radius in zip(packing.centres, packing.radii, strict=True):
+        void &= ((grid - centre) ** 2).sum(axis=1) > radius**2
+    return void.mean()
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.2, 1.3])
+def test_porosity_is_true_to_within_the_error_it_tells(reference, factor):
+    packing = resized(reference("n54_s1"), factor)
+    true = counted_porosity(packing)
+    assert packing.porosity - packing.porosity_error - 2e-3 < true < packing.porosity + 2e-3
+    assert (packing.porosity_error > 0.0) == (packing.triple_overlaps > 0) == (factor > 1.15)
+
+
+def test_triples_of_spheres_and_walls_are_counted():
+    r, h = 0.1, 0.1 * np.sqrt(3)
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0]])
+    for side, triples in ((1.74, 0), (1.73, 1)):  # they share their middle from √3 radii on
+        assert Packing(0.4 + side * r * corners, [r] * 3, UNIT).triple_overlaps == triples
+    # Three in a row, the outer two within reach of each other, inside the middle one.
+    assert Packing([[0.4, 0.5, 0.5], [0.5, 0.5, 0.5], [0.595, 0.5, 0.5]], [r, 0.09, r], UNIT).triple_overlaps == 1
+    # A sphere that reaches over an edge of the box, and two whose lens reaches over a wall.
+    assert Packing([[0.08, 0.5, 0.08]], [r], UNIT).triple_overlaps == 0 + (2 * 0.08**2 < r**2)
+    assert Packing([[0.06, 0.5, 0.06]], [r], UNIT).triple_overlaps == 1
+    for z, triples in ((0.06, 0), (0.04, 1)):  # the circle they share has radius 0.05
+        assert Packing([[0.5 - h / 2, 0.5, z], [0.5 + h / 2, 0.5, z]], [r, r], UNIT).triple_overlaps == triples
+
+
+def deep_lattice(radius):
+    grid = (np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3) + 0.5) / 4
+    return Packing(grid, np.full(64, radius / 4), UNIT)
+
+
+def test_overlap_too_deep_for_volumes_is_an_error():
+    assert deep_lattice(0.7).porosity_error == 0.0
+    with pytest.raises(ComputationError, match="overlap so deeply"):
+        _ = deep_lattice(0.95).porosity
+
+
+@pytest.mark.parametrize("radius", [0.6, 0.72, 0.8, 0.95])
+def test_forces_add_up_however_deep_the_overlap(unit_flow, radius):
+    # Of squares cut in two, neither of whose triangles has a surface left that could take the drag.
+    flow = unit_flow(PoreMesh(deep_lattice(radius), wall_tolerance=1.0), Walls.along("y"))
+    assert flow.forces.conservation_residual < 1e-12
+
+
+# ---- numbers that cannot be computed with --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1e-60, 1e-31, 1e31, 1e60])
+def test_boxes_whose_lengths_leave_double_precision_are_refused(reference, scale):
+    with pytest.raises(InputError, match="sides .* must lie between 1e-30 and 1e.30 m"):
+        PoreMesh(scaled(reference("n25_s1"), scale))
+
+
+@pytest.mark.parametrize("scale", [1e-29, 1e29])
+def test_boxes_within_the_limits_lose_no_digits(reference, unit_flow, scale):
+    packing = reference("n25_s1")
+    flow, other = (unit_flow(PoreMesh(p), Walls.along("y")) for p in (packing, scaled(packing, scale)))
+    assert_allclose(other.permeability / scale**2, flow.permeability, rtol=1e-11)
+
+
+@pytest.mark.parametrize("radius", [1e-16, 1e-300])
+def test_a_radius_that_the_box_cannot_resolve_is_refused(radius):
+    with pytest.raises(InputError, match="radius not between 1e-15 m"):
+        PoreMesh(Packing([[0.5] * 3, [0.2] * 3], [0.1, radius], UNIT))
+
+
+def test_pressures_viscosities_densities_and_gravity_beyond_products_are_refused(reference):
+    for value in (1e-70, 1e70, -1e300):
+        with pytest.raises(InputError, match="pressure must be 0 or of size"):
+            Wall(pressure=value)
+    for value in (1e-70, 1e70):
+        with pytest.raises(InputError, match="viscosity must lie between"):
+            Fluid(viscosity=value)
+    with pytest.raises(InputError, match="density must be at most"):
+        Fluid(density=1e70)
+    with pytest.raises(InputError, match="gravity must be at most"):
+        PoreFlow(reference("n25_s1"), Walls.along("y"), gravity=(0, 0, 1e70))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_model_that_gives_no_number_is_an_error(reference, value):
+    class Broken:
+        name = "broken"
+
+        def conductivity(self, throats, slip):
+            conductivity = throats.fluid_areas**2
+            conductivity[3] = value
+            return conductivity
+
+    flow = PoreFlow(reference("n25_s1"), Walls.along("y"), conductance=Broken())
+    with pytest.raises(ComputationError, match="1 of 240 conductances of broken are not finite"):
+        _ = flow.permeability
+
+
+def test_a_force_that_is_no_number_cannot_pass_for_conserved(reference, unit_flow):
+    import dataclasses
+
+    forces = unit_flow(PoreMesh(reference("n25_s1")), Walls.along("y")).forces
+    broken = dataclasses.replace(forces, pressure=np.full_like(forces.pressure, np.nan))
+    assert np.isnan(broken.conservation_residual)
+
+
+# ---- what is counted -----------------------------------------------------------------------------------------
+
+
+def test_summary_counts_every_case_that_has_a_rule_of_its_own(reference, tmp_path):
+    flow = PoreFlow(
+        with_fines(reference("n54_s1"), 1e4), Walls(x_min=Wall(pressure=1.0), y_min=Wall(pressure=0.0)), Fluid(1.0)
+    )
+    summary = results.read(results.write(flow, tmp_path / "results", quantities=["pressure"], vtk=False)).summary
+    assert set(summary["unusual"]) == {
+        "closed_throats", "throats_without_length", "throats_without_conductance", "isolated_pores",
+        "pores_of_several_pressures", "throats_without_volume", "throats_without_surface", "throats_wider_than_the_box",
+    }  # fmt: skip
+    assert summary["unusual"]["throats_wider_than_the_box"] > 0
+    edge = (flow.mesh.cells >= flow.mesh.n_spheres).sum(axis=1) >= 2
+    assert 0 < summary["unusual"]["pores_of_several_pressures"] <= edge.sum()
+    packing = summary["packing"]
+    assert (packing["hidden_spheres"], packing["overlapping_triples"], packing["porosity_error"]) == (0, 0, 0.0)
+    assert summary["solver"]["pressure_error"] <= 1e-8
+
+
+# ---- memory --------------------------------------------------------------------------------------------------
+
+
+def test_a_packing_with_far_more_pores_than_usual_is_refused_before_memory_runs_out(monkeypatch):
+    # Two skew rows of m spheres have m² cells, hundreds a sphere.
+    m = 300
+    s = np.linspace(0.1, 0.9, m)
+    rows = [np.stack(c, axis=1) for c in ((s, 0 * s + 0.4, 0 * s + 0.4), (0 * s + 0.6, s, 0 * s + 0.6))]
+    centres, radii = np.concatenate(rows), np.full(2 * m, 1e-3)
+    assert len(RegularTriangulation(centres, radii, UNIT).cells) > m**2 / 2
+    monkeypatch.setattr(memory, "available", lambda: 20 * 2**20)
+    with pytest.raises(ComputationError, match="more than .* pores, which need .* GiB of memory"):
+        RegularTriangulation(centres, radii, UNIT)
+
+
+def test_memory_is_compared_before_work_starts(reference, monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 2**20)
+    with pytest.raises(ComputationError, match="25 spheres need about .* GiB of memory, 0.0 GiB are free"):
+        _ = PoreMesh(reference("n25_s1")).cells
+
+
+# ---- files half written --------------------------------------------------------------------------------------
+
+SCENE = """\
+packing = "{packing}"
+[walls]
+y_min = {{ pressure = 1.0 }}
+y_max = {{ pressure = 0.0 }}
+[output]
+quantities = ["permeability", "pressure", "forces"]
+vtk = {vtk}
+"""
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """Every kernel of a solve is in numba's cache: where a disk is full, it cannot be put there."""
+    flow = PoreFlow(Packing.read(PACKINGS / "n2000_s1.csv"), Walls.along("y"))
+    results.write(flow, tmp_path_factory.mktemp("compiled") / "results")
+
+
+@pytest.fixture
+def project(tmp_path, compiled):
+    """A scene of 2000 spheres, and results of an earlier one."""
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "summary.json").write_text("earlier")
+    text = SCENE.format(packing=(PACKINGS / "n2000_s1.csv").as_posix(), vtk="true")
+    (tmp_path / "scene.toml").write_text(text)
+    return tmp_path
+
+
+def untouched(project):
+    return (
+        sorted(path.name for path in project.iterdir()) == ["results", "scene.toml"]
+        and [path.name for path in (project / "results").iterdir()] == ["summary.json"]
+        and (project / "results" / "summary.json").read_text() == "earlier"
+    )
+
+
+def solving(project, **options):
+    command = [sys.executable, "-m", "porefv", "solve", str(project / "scene.toml"), "--force", "--quiet"]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **options)
+
+
+@posix
+@pytest.mark.parametrize("after", [0.0, 0.2, 0.6])
+def test_an_interruption_leaves_what_existed_and_nothing_half_written(project, after):
+    process = solving(project)
+    while process.poll() is None and not list(project.glob(".results-*")):
+        time.sleep(0.002)  # until the temporary folder stands: the interruption must clear it away
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    if not untouched(project):  # it was done before
+        assert after > 0.0 and "permeability" in results.read(project / "results").summary
+        assert sorted(path.name for path in project.iterdir()) == ["results", "scene.toml"]
+        return
+    assert process.returncode == 130 and "interrupted; nothing was written" in said and "Traceback" not in said
+    assert untouched(project)
+
+
+@posix
+@pytest.mark.parametrize("room", [0, 300_000])
+def test_a_full_disk_loses_nothing_that_existed(project, room):
+    process = solving(project, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 2, said
+    assert "cannot write" in said and "Traceback" not in said
+    assert untouched(project)
+
+
+@posix
+@pytest.mark.parametrize("name", ["grains.csv", "grains.txt", "grains.vtp"])
+def test_a_packing_written_to_a_full_disk_leaves_the_old_one(tmp_path, name):
+    (tmp_path / name).write_text("earlier")
+    code = (
+        "import sys, porefv; packing = porefv.Packing.read(sys.argv[1])\n"
+        "try: packing.write(sys.argv[2])\n"
+        "except porefv.InputError as error: sys.exit(f'refused: {error}')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(PACKINGS / "n2000_s1.csv"), str(tmp_path / name)],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 1 and done.stderr.startswith("refused: cannot write"), done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == "earlier"
