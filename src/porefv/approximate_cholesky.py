@@ -39,14 +39,14 @@ class ApproximateCholesky:
 
     Attributes
     ----------
-    order : (n,) int32 array
+    order : (n,) uint32 array
         Node at each position.
     parts : (p + 1,) int64 array
         Position where each part starts; the last is where the separator starts.
-    starts : (n + 1,) int64, rows : (fill,) int32, factors : (fill,) float32 arrays
-        Column k of -L below its unit diagonal.
-    pivots : (n,) array
-        D.
+    starts : (n + 1,) uint32, rows : (fill,) uint32, factors : (fill,) float32 arrays
+        Column k of -L below its unit diagonal. Indices without sign need no look at whether they count from the end.
+    inverse_pivots : (n,) array
+        1 / D.
     row_starts, row_columns, row_factors
         The rows of -L in which the separator hangs on the parts, so that every row can be summed by itself.
     """
@@ -56,7 +56,7 @@ class ApproximateCholesky:
     starts: np.ndarray
     rows: np.ndarray
     factors: np.ndarray
-    pivots: np.ndarray
+    inverse_pivots: np.ndarray
     row_starts: np.ndarray
     row_columns: np.ndarray
     row_factors: np.ndarray
@@ -98,7 +98,10 @@ class ApproximateCholesky:
         )
         rows = np.concatenate([position[piece[2]] for piece in pieces])
         factors = np.concatenate([piece[3] for piece in pieces])
-        return cls(order, parts, starts, rows, factors, pivots, *_rows_of(parts[-1], starts, rows, factors))
+        return cls(
+            order.astype(np.uint32), parts, starts.astype(np.uint32), rows.astype(np.uint32), factors, 1.0 / pivots,
+            *_rows_of(parts[-1], starts, rows, factors),
+        )  # fmt: skip
 
     @staticmethod
     def _separator_piece(network, separator, pieces):
@@ -118,8 +121,10 @@ class ApproximateCholesky:
 
     def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
         """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z. `y`, (n,), is room to work in."""
-        return substitute(
-            self.order, self.parts, self.starts, self.rows, self.factors, self.pivots,
+        if len(self.parts) == 2 or get_num_threads() == 1:
+            return _substitute(self.order, self.starts, self.rows, self.factors, self.inverse_pivots, r, z, y)
+        return _substitute_parts(
+            self.order, self.parts, self.starts, self.rows, self.factors, self.inverse_pivots,
             self.row_starts, self.row_columns, self.row_factors, r, z, y,
         )  # fmt: skip
 
@@ -401,11 +406,24 @@ def _rows_of(n_inner, starts, rows, factors):
     return row_starts, columns, row_factors
 
 
-@njit(cache=True, parallel=True)
-def substitute(
-    order, parts, starts, rows, factors, pivots, row_starts, row_columns, row_factors, r, z, y
-):  # fmt: skip
+@njit(cache=True, error_model="numpy")
+def _substitute(order, starts, rows, factors, inverse_pivots, r, z, y):
     """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z."""
+    n = order.shape[0]
+    for k in range(n):
+        y[k] = r[order[k]]
+    for k in range(n):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            y[rows[e]] += factors[e] * v
+    return _backward(0, n, order, starts, rows, factors, inverse_pivots, r, z, y)
+
+
+@njit(cache=True, parallel=True)
+def _substitute_parts(
+    order, parts, starts, rows, factors, inverse_pivots, row_starts, row_columns, row_factors, r, z, y
+):  # fmt: skip
+    """The same, parts side by side."""
     n = order.shape[0]
     n_parts = parts.shape[0] - 1
     n_inner = parts[n_parts]
@@ -421,9 +439,11 @@ def substitute(
         v = y[k]
         for e in range(starts[k], starts[k + 1]):
             y[rows[e]] += factors[e] * v
-    products[n_parts] = _backward(n_inner, n, order, starts, rows, factors, pivots, r, z, y)
+    products[n_parts] = _backward(n_inner, n, order, starts, rows, factors, inverse_pivots, r, z, y)
     for part in prange(n_parts):
-        products[part] = _backward(parts[part], parts[part + 1], order, starts, rows, factors, pivots, r, z, y)
+        products[part] = _backward(
+            parts[part], parts[part + 1], order, starts, rows, factors, inverse_pivots, r, z, y
+        )  # fmt: skip
     return products.sum()
 
 
@@ -440,11 +460,11 @@ def _forward(first, last, n_inner, order, starts, rows, factors, r, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _backward(first, last, order, starts, rows, factors, pivots, r, z, y):
+def _backward(first, last, order, starts, rows, factors, inverse_pivots, r, z, y):
     """y and z = L⁻ᵀ D⁻¹ y for one part; returns its part of r·z."""
     product = 0.0
     for k in range(last - 1, first - 1, -1):
-        s = y[k] / pivots[k]
+        s = y[k] * inverse_pivots[k]
         for e in range(starts[k], starts[k + 1]):
             s += factors[e] * y[rows[e]]
         y[k] = s

@@ -32,14 +32,18 @@ class Exchange:
 
     Attributes
     ----------
-    rows : (m, 4) int32 array
+    rows : (m, 4) uint32 array
         Row of each vertex of each cell in arrays of velocities or forces: grains, then the six walls.
     gradients : (m, 4, 3) array
         What a pressure of 1 in the cell does to each vertex [m²].
+    nodes : (m,) uint32 array
+        Entry of each cell in arrays of pressures or volume rates. (Indices without sign need no look at whether they
+        count from the end.)
     """
 
     rows: np.ndarray
     gradients: np.ndarray
+    nodes: np.ndarray
 
     @classmethod
     def of(cls, mesh: PoreMesh, kind: str, slip: np.ndarray, slots: np.ndarray | None = None) -> Exchange:
@@ -56,22 +60,35 @@ class Exchange:
         """
         n = mesh.n_spheres
         gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip)
-        number = np.arange(n + 6, dtype=np.int32)
+        number = np.arange(n + 6, dtype=np.uint32)
         if slots is not None:
             number[:n] = slots
-        return cls(number[mesh.cells], gradients)
+        return cls(number[mesh.cells], gradients, np.arange(mesh.n_cells, dtype=np.uint32))
+
+    def between(self, nodes: np.ndarray) -> Exchange:
+        """The same with these entries (m,) for the cells, without the cells where they are negative."""
+        used = nodes >= 0
+        return Exchange(self.rows[used], self.gradients[used], nodes[used].astype(np.uint32))
 
     def rates(self, velocities: np.ndarray, wall_velocities: np.ndarray) -> np.ndarray:
         """(m,): E ẋ of each cell, from velocities (n, 3) of the grains and (6, 3) of the walls [m³/s]."""
         out = np.zeros(len(self.rows))
-        gather(self.rows, self.gradients, np.arange(len(out)), np.concatenate([velocities, wall_velocities]), out)
+        self.gather(np.concatenate([velocities, wall_velocities]), out)
         return out
 
     def forces(self, pressure: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
         """Eᵀ p: forces on grains (n, 3) and walls (6, 3), from the pressure of each cell (m,) [N]."""
         out = np.zeros((n + 6, 3))
-        spread(self.rows, self.gradients, np.arange(len(self.rows)), pressure, out)
+        self.spread(pressure, out)
         return out[:n], out[n:]
+
+    def gather(self, moves: np.ndarray, out: np.ndarray) -> None:
+        """Add E ẋ to `out`, by entry, from the velocities (n + 6, 3) of grains, by row, and walls."""
+        gather(self.rows, self.gradients, self.nodes, moves, out)
+
+    def spread(self, pressure: np.ndarray, out: np.ndarray) -> None:
+        """Add Eᵀ p to `out` (n + 6, 3), from pressures by entry."""
+        spread(self.rows, self.gradients, self.nodes, pressure, out)
 
 
 def _facet_gradients(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
@@ -98,25 +115,23 @@ def _gather_facets(cells, facet_cells, facet_vertices, forces, gradients):
 
 
 @njit(cache=True, nogil=True)
-def gather(rows, gradients, node, moves, out):
-    """out[node] += Σ gradient · move over each cell's vertices; cells without a node (negative) are left out."""
+def gather(rows, gradients, nodes, moves, out):
+    """out[node] += Σ gradient · move over each cell's vertices."""
     for t in range(rows.shape[0]):
-        if node[t] >= 0:
-            total = 0.0
-            for i in range(4):
-                k = rows[t, i]
-                for axis in range(3):
-                    total += gradients[t, i, axis] * moves[k, axis]
-            out[node[t]] += total
+        total = 0.0
+        for i in range(4):
+            k = rows[t, i]
+            for axis in range(3):
+                total += gradients[t, i, axis] * moves[k, axis]
+        out[nodes[t]] += total
 
 
 @njit(cache=True, nogil=True)
-def spread(rows, gradients, node, pressure, out):
-    """out[vertex] += gradient × pressure[node], over the vertices of each cell that has a node."""
+def spread(rows, gradients, nodes, pressure, out):
+    """out[vertex] += gradient × pressure[node], over the vertices of each cell."""
     for t in range(rows.shape[0]):
-        if node[t] >= 0:
-            p = pressure[node[t]]
-            for i in range(4):
-                k = rows[t, i]
-                for axis in range(3):
-                    out[k, axis] += gradients[t, i, axis] * p
+        p = pressure[nodes[t]]
+        for i in range(4):
+            k = rows[t, i]
+            for axis in range(3):
+                out[k, axis] += gradients[t, i, axis] * p

@@ -85,6 +85,8 @@ class PoreFluid:
         self.free = np.isnan(held_pressures(mesh, pressures))
         number = np.where(self.free, np.cumsum(self.free) - 1, -1).astype(np.int32)
         self._node = number[mesh.cell_pore]
+        self._of_free = exchange.between(self._node)
+        self._of_held = exchange.between(np.where(self._node < 0, mesh.cell_pore, -1))
         free = int(np.count_nonzero(self.free))
         self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
         # What walls yielded when the factor was made; empty before.
@@ -102,9 +104,9 @@ class PoreFluid:
             pairs, self.conductances, self._held, self.free, np.zeros(mesh.n_pores)
         )
         self._weights = 1.0 / self.network.diagonal
-        held_cell = np.where(self._node < 0, mesh.cell_pore, -1)
+        self._starts, self._columns = self.network.starts.astype(np.uint32), self.network.columns.astype(np.uint32)
         self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
-        spread(self.exchange.rows, self.exchange.gradients, held_cell, self._held, self._held_forces)
+        self._of_held.spread(self._held, self._held_forces)
 
     # ---- solving ------------------------------------------------------------------------------------------------
 
@@ -136,12 +138,12 @@ class PoreFluid:
         moved = velocities.copy()
         _yield(self._held_forces, self.mobilities, wall_mobilities, moved)
         rhs = np.zeros(len(self.network))
-        gather(self.exchange.rows, self.exchange.gradients, self._node, moved, rhs)
+        self._of_free.gather(moved, rhs)
         np.subtract(self._inflow, rhs, out=rhs)
         x = guess.copy()
         q, aq, z, room = self._room
         arguments = (
-            self.exchange.rows, self.exchange.gradients, self._node, self.network.starts, self.network.columns,
+            self._of_free.rows, self._of_free.gradients, self._of_free.nodes, self._starts, self._columns,
             self.network.links, self.network.leaks, self.mobilities, wall_mobilities, self._room_for_forces,
         )  # fmt: skip
         _multiply(*arguments, x, aq)
@@ -195,12 +197,11 @@ class PoreFluid:
         """E D Eᵀ of the grains, between free pores."""
         from scipy import sparse
 
-        n, used = len(self.mobilities), self._node >= 0
-        vertices = self.exchange.rows[used]
-        columns = (3 * vertices[:, :, None] + np.arange(3)).ravel()
-        rows = np.repeat(self._node[used], 12)
+        n, free = len(self.mobilities), self._of_free
+        columns = (3 * free.rows.astype(np.int64)[:, :, None] + np.arange(3)).ravel()
+        rows = np.repeat(free.nodes.astype(np.int64), 12)
         shape = len(self.network), 3 * (n + 6)
-        operator = sparse.csr_array((self.exchange.gradients[used].ravel(), (rows, columns)), shape=shape)
+        operator = sparse.csr_array((free.gradients.ravel(), (rows, columns)), shape=shape)
         mobilities = np.repeat(np.append(self.mobilities, np.zeros(6)), 3)
         return (operator @ sparse.diags_array(mobilities) @ operator.T).tocsr()
 
@@ -215,7 +216,7 @@ class PoreFluid:
     def forces(self, pressure: np.ndarray) -> np.ndarray:
         """(n + 6, 3): force on grains, by row, and walls, from the pressures of the free pores [N]."""
         forces = self._held_forces.copy()
-        spread(self.exchange.rows, self.exchange.gradients, self._node, pressure, forces)
+        self._of_free.spread(pressure, forces)
         return forces
 
     def wall_fluxes(self, pressure: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -226,7 +227,7 @@ class PoreFluid:
         flux = self.conductances * (full[i] - full[j])
         n = mesh.n_pores
         taken = np.bincount(i, flux, n) - np.bincount(j, flux, n)  # what pores give away, and swell by
-        gather(self.exchange.rows, self.exchange.gradients, mesh.cell_pore, velocities, taken)
+        self.exchange.between(mesh.cell_pore).gather(velocities, taken)
         pores = mesh.cell_pore[faces.cells]
         area = np.where(np.isnan(self.wall_pressures)[faces.walls], 0.0, faces.areas)
         share = np.divide(area, np.bincount(pores, area, n)[pores], out=np.zeros(len(area)), where=area > 0.0)
@@ -260,10 +261,10 @@ class PoreFluid:
         largest = 0.0
         for _ in range(100):
             rates = np.zeros(len(self.network))
-            gather(self.exchange.rows, self.exchange.gradients, self._node, moves, rates)
+            self._of_free.gather(moves, rates)
             forces = np.zeros_like(moves)
             pressure, _ = solver.solve(rates, 1e-4)
-            spread(self.exchange.rows, self.exchange.gradients, self._node, pressure, forces)
+            self._of_free.spread(pressure, forces)
             size = float(np.sqrt((moves[:-6] ** 2 / root**2).sum()))
             before, largest = largest, float(np.sqrt((forces[:-6] ** 2 * root**2).sum())) / size
             if abs(largest - before) <= 1e-3 * largest or largest > enough:
@@ -311,11 +312,11 @@ def _yield(forces, mobilities, wall_mobilities, moves):
 
 
 @njit(cache=True, nogil=True)
-def _multiply(rows, gradients, node, starts, columns, links, leaks, mobilities, wall_mobilities, forces, q, aq):
+def _multiply(rows, gradients, nodes, starts, columns, links, leaks, mobilities, wall_mobilities, forces, q, aq):
     """aq = (G + E D Eᵀ) q; returns q·aq. `forces`, (n + 6, 3), is room to work in."""
     n = mobilities.shape[0]
     forces[:] = 0.0
-    spread(rows, gradients, node, q, forces)
+    spread(rows, gradients, nodes, q, forces)
     for k in range(n):
         for axis in range(3):
             forces[k, axis] *= mobilities[k]
@@ -327,7 +328,7 @@ def _multiply(rows, gradients, node, starts, columns, links, leaks, mobilities, 
         for k in range(starts[i], starts[i + 1]):
             total += links[k] * (q[i] - q[columns[k]])
         aq[i] = total
-    gather(rows, gradients, node, forces, aq)
+    gather(rows, gradients, nodes, forces, aq)
     return _dot(q, aq)
 
 
