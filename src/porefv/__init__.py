@@ -30,6 +30,7 @@ _HOME = {
     "PoreMesh": "mesh",
     "PorefvError": "errors",
     "RegularTriangulation": "tessellation",
+    "SectionFriction": "conductance",
     "Throats": "throats",
     "WALLS": "packing",
     "Wall": "boundary",

@@ -7,8 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from porefv.errors import InputError
+from porefv.facets import row_sums
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS
+
+SHARES = ("surface", "drag")
+# Shear on a sphere with much room, over u / r with u the throat's mean speed: fitted. In an unbounded stream 1.5.
+SHEAR = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +85,7 @@ def fluid_forces(
     *,
     reference: float = 0.0,
     weight: np.ndarray | None = None,
+    shares: str = "surface",
 ) -> Forces:
     """Forces due to a piezometric pressure field and the weight of the fluid.
 
@@ -93,6 +100,10 @@ def fluid_forces(
         Pressure that all pores have besides [Pa]: pushes on the walls only.
     weight : (3,) array, optional
         Weight of a unit volume of fluid, ρ g [N/m³].
+    shares : {'surface', 'drag'}
+        How the vertices of a facet share the drag in its throat. By the surface γ^k that is wetted of them, as C12 eq.
+        18; or by γ^k times the shear on it, which on a sphere with much room around goes as 1 / r: drag by radius,
+        as Stokes', not by surface.
     """
     n = mesh.n_spheres
     throats = mesh.throats
@@ -100,9 +111,9 @@ def fluid_forces(
     on_spheres_v = np.zeros((n + 6, 3))
     cell_pressure = pressure[mesh.cell_pore]
     drops = cell_pressure[mesh.facet_cells[:, 0]] - cell_pressure[mesh.facet_cells[:, 1]]
-    vectors, shares = _drag(mesh, slip)
+    vectors, parts = _drag(mesh, slip, shares)
     _scatter(
-        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, shares, drops,
+        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, parts, drops,
         on_spheres_p, on_spheres_v,
     )  # fmt: skip
 
@@ -138,20 +149,47 @@ def fluid_forces(
     )
 
 
-def facet_forces(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
-    """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, A^k n + A^f n γ^k/Σγ [m²]."""
-    vectors, shares = _drag(mesh, slip)
+def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> np.ndarray:
+    """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, A^k n + A^f n γ^k/Σγ [m²].
+
+    `shares` as of `fluid_forces`.
+    """
+    vectors, parts = _drag(mesh, slip, shares)
     sectors = mesh.throats.facet_sectors[:, :, None] * mesh.throats.facet_normals[:, None, :]
-    return sectors + shares[:, :, None] * vectors[:, None, :]
+    return sectors + parts[:, :, None] * vectors[:, None, :]
 
 
-def _drag(mesh: PoreMesh, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _drag(mesh: PoreMesh, slip: np.ndarray, shares: str) -> tuple[np.ndarray, np.ndarray]:
     """Viscous force (f, 3) for a unit pressure drop, A^f n of the facet's throat, and its vertices' shares (f, 3)."""
+    if shares not in SHARES:
+        raise InputError(f"unknown shares {shares!r}; known: {', '.join(SHARES)}")
     throats = mesh.throats
     weights = throats.facet_wetted_surfaces(slip)
+    if shares == "drag":
+        volumes = throats.total_by_facet(throats.facet_volumes)
+        surfaces = throats.total_by_facet(row_sums(weights))
+        weights = _sheared(weights, volumes, surfaces, mesh.facet_vertices, mesh.n_spheres, mesh.sizes)
     sums = throats.total_by_facet(_positive_sum(weights))
     vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
     return vectors, _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
+
+
+@njit(cache=True)
+def _sheared(weights, volumes, surfaces, facet_vertices, n, sizes):
+    """Wetted surfaces times the shear on them, relative to that in a narrow throat: √(1 + (c R_h / r)²), on walls 1.
+
+    It is in proportion to 1 / R_h in a throat that is narrow for its spheres, to c / r on a sphere with much room.
+    """
+    sheared = weights.copy()
+    for f in range(weights.shape[0]):
+        if volumes[f] <= 0.0 or surfaces[f] <= 0.0:
+            continue
+        radius = volumes[f] / surfaces[f]
+        for v in range(3):
+            k = facet_vertices[f, v]
+            if k < n:
+                sheared[f, v] *= np.sqrt(1.0 + (SHEAR * radius / sizes[k]) ** 2)
+    return sheared
 
 
 @njit(cache=True)

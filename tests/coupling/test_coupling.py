@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Wall, Walls
+from porefv.conductance import MODELS
 from porefv.coupling import Coupling, Exchange, checkpoint
 from porefv.dem import DEM, Material, Plate
 from porefv.errors import InputError
-from porefv.forces import fluid_forces
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 SEALED = Walls.from_mapping({"lateral": {"slip": True}})
@@ -91,13 +91,14 @@ def test_volume_rates_are_those_of_the_cells(reference):
 
 
 @pytest.mark.parametrize("slip", [False, True])
-def test_facet_forces_are_those_of_a_steady_flow(reference, slip):
+@pytest.mark.parametrize("model", MODELS.values())
+def test_facet_forces_are_those_of_a_steady_flow(reference, slip, model):
     packing = reference("n54_s1")
     walls = Walls.along("y", slip=slip)
-    flow = PoreFlow(packing, walls)
-    grains, _ = Exchange.of(flow.mesh, "facets", walls.slip).forces(flow.cell_pressure, len(packing))
-    steady = fluid_forces(flow.mesh, flow.pressure, ~np.isnan(walls.pressures), walls.slip)
-    assert_allclose(grains, steady.total, atol=1e-13)
+    flow = PoreFlow(packing, walls, conductance=model())
+    shares = getattr(model, "shares", "surface")
+    grains, _ = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares).forces(flow.cell_pressure, len(packing))
+    assert_allclose(grains, flow.forces.pressure + flow.forces.viscous, atol=1e-13)
 
 
 # ---- one pore, one layer, a piston -----------------------------------------------------------------------------
@@ -281,6 +282,17 @@ def test_a_resumed_run_is_the_run_to_the_last_bit(sample, tmp_path):
     assert_array_equal(coupling.pressure, again.pressure)
     assert_array_equal(dem.positions, again.grains.positions)
     assert_array_equal(dem.velocities, again.grains.velocities)
+
+
+def test_any_model_of_conductance_is_resumed(sample, tmp_path):
+    coupling = Coupling(sample(6e3), DRAINED, Fluid(viscosity=100.0), MODELS["section-friction"](friction=2.5))
+    coupling.run(5)
+    checkpoint.save(coupling, tmp_path / "state.npz")
+    again = checkpoint.load(tmp_path / "state.npz")
+    assert again.conductance == coupling.conductance
+    coupling.run(5)
+    again.run(5)
+    assert_array_equal(coupling.pressure, again.pressure)
 
 
 def test_damaged_checkpoints_are_refused(sample, tmp_path):

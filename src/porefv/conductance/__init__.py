@@ -17,6 +17,8 @@ from typing import Protocol
 import numpy as np
 from numba import njit, prange
 
+from porefv.boundary import LEAST, MOST, within_range
+from porefv.conductance.sections import SectionFriction
 from porefv.errors import InputError
 from porefv.throats import Throats
 
@@ -50,6 +52,8 @@ class HydraulicRadius:
     def __post_init__(self) -> None:
         if not (isinstance(self.alpha, (int, float)) and 0.0 < self.alpha < np.inf):
             raise InputError(f"alpha must be a positive number, not {self.alpha!r}")
+        if not within_range(self.alpha):
+            raise InputError(f"alpha must lie between {LEAST:g} and {MOST:g}, not {self.alpha!r}")
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         return _hydraulic_radius(self.alpha, throats.fluid_areas, throats.volumes, throats.wetted_surfaces(slip))
@@ -83,11 +87,11 @@ def _hydraulic_radius(alpha, areas, volumes, surfaces):
     return conductivity
 
 
-MODELS = {model.name: model for model in (HydraulicRadius, EffectiveRadius)}
+MODELS = {model.name: model for model in (HydraulicRadius, EffectiveRadius, SectionFriction)}
 
 
 def conductance_model(name: str, **parameters: float) -> ConductanceModel:
-    """The model of that name, `hydraulic-radius` or `effective-radius`.
+    """The model of that name, `hydraulic-radius`, `effective-radius` or `section-friction`.
 
     Raises
     ------

@@ -242,7 +242,8 @@ class Coupling:
             conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
             if self.options["end_correction"]:
                 conductances = corrected(mesh, conductances, pressures)
-            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots)
+            shares = getattr(self.conductance, "shares", "surface")
+            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots, shares=shares)
             drag = np.empty(len(packing))
             drag[grains.slots] = grains.step / grains.masses
             self._choose(lambda mobilities: PoreFluid(mesh, exchange, conductances, pressures, mobilities), drag)

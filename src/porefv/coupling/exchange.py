@@ -46,7 +46,15 @@ class Exchange:
     nodes: np.ndarray
 
     @classmethod
-    def of(cls, mesh: PoreMesh, kind: str, slip: np.ndarray, slots: np.ndarray | None = None) -> Exchange:
+    def of(
+        cls,
+        mesh: PoreMesh,
+        kind: str,
+        slip: np.ndarray,
+        slots: np.ndarray | None = None,
+        *,
+        shares: str = "surface",
+    ) -> Exchange:
         """The operator of a mesh.
 
         Parameters
@@ -57,9 +65,11 @@ class Exchange:
             Walls that do not drag the fluid.
         slots : (n,) int array, optional
             Row of each grain, its id by default.
+        shares : {'surface', 'drag'}
+            How vertices share the drag of a throat, where forces are by facets (see `fluid_forces`).
         """
         n = mesh.n_spheres
-        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip)
+        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, shares)
         number = np.arange(n + 6, dtype=np.uint32)
         if slots is not None:
             number[:n] = slots
@@ -91,9 +101,9 @@ class Exchange:
         spread(self.rows, self.gradients, self.nodes, pressure, out)
 
 
-def _facet_gradients(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
+def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, shares: str) -> np.ndarray:
     gradients = np.zeros((mesh.n_cells, 4, 3))
-    _gather_facets(mesh.cells, mesh.facet_cells, mesh.facet_vertices, facet_forces(mesh, slip), gradients)
+    _gather_facets(mesh.cells, mesh.facet_cells, mesh.facet_vertices, facet_forces(mesh, slip, shares), gradients)
     faces = mesh.wall_faces
     on_wall = (mesh.cells[faces.cells] == (mesh.n_spheres + faces.walls)[:, None]).argmax(axis=1)
     np.add.at(gradients, (faces.cells, on_wall), faces.areas[:, None] * wall_normals()[faces.walls])

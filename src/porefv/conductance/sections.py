@@ -1,0 +1,197 @@
+"""Friction in the cross-sections of a throat, one after another from pore to pore.
+
+The centres of a throat's spheres lie in its facet's plane. At a height s over it the spheres are discs of radius
+√(r² - s²), whose arcs are wetted by the fluid, and leave it the area A(s) = A^f + Σ θ min(s, r)² / 2 of the prism over
+the facet. So the section opens as those of a hyperboloid do, whatever the sizes of spheres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+
+from porefv.boundary import LEAST, MOST, within_range
+from porefv.errors import InputError
+from porefv.facets import _at, _cross, _dot, _height, _minus, _towards
+from porefv.throats import Throats
+
+# A hyperboloid as wide at its neck as it is long, which four spheres make, loses pressure over √2 times that length.
+STRETCH = np.sqrt(0.5)
+# Beyond its poles a sphere still slows the fluid down: at s > r as a disc of this part of its radius times (r / s)².
+LEAST_DISC = 0.3
+# Four points in either half of a throat integrate its friction within some 0.3 %.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+
+
+@dataclass(frozen=True)
+class SectionFriction:
+    """Friction summed over the cross-sections of a throat: L / (μ g) = ∫ (c₁ P + 2 c₂ A / r) / (A² w) ds.
+
+    A(s) and P(s) are a section's fluid area and wetted perimeter, w its opening, and r a mean radius of the spheres, ∛r
+    weighed by their angles. Fluid that passes with q / A on average and is at rest on the perimeter is sheared
+    by q / (A w), which on all of the perimeter makes the first part. The second, for round bodies, is greater the
+    further they are apart, and alone is left where there is much more room than grains: a drag in proportion to r.
+
+    w = λ max(√(A/π), 2 A / P): λ, the radius of the circle inscribed in the neck over that of the circle of the
+    neck's area, keeps the flow out of cusps. P counts no-slip walls; of a throat on a wall of symmetry the whole, with
+    its mirror images, is considered.
+
+    Parameters
+    ----------
+    friction, curvature : float
+        c₁, c₂: fitted to permeabilities by resolved Stokes flow (docs/accuracy.md).
+    """
+
+    friction: float = 2.2
+    curvature: float = 1.8
+    name = "section-friction"
+    shares = "drag"
+
+    def __post_init__(self) -> None:
+        for what in ("friction", "curvature"):
+            value = getattr(self, what)
+            if not (isinstance(value, (int, float)) and 0.0 < value < np.inf and within_range(value)):
+                raise InputError(f"{what} must be a positive number between {LEAST:g} and {MOST:g}, not {value!r}")
+
+    def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        mesh = throats.mesh
+        conductivity = np.empty(len(throats))
+        further, starts = _further_facets(throats)
+        _section_friction(
+            throats.first_facets, further, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
+            mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.lengths,
+            throats.fluid_areas, throats.mirror_images(slip), throats.inscribed_radii(slip), np.asarray(slip, bool),
+            self.friction, self.curvature, conductivity,
+        )  # fmt: skip
+        return conductivity
+
+
+def _further_facets(throats: Throats) -> tuple[np.ndarray, np.ndarray]:
+    """Facets besides the first of throats that a tie has cut, by throat, and where those of each throat start."""
+    further = throats.facet_throat >= 0
+    further[throats.first_facets] = False
+    facets = np.flatnonzero(further)
+    facets = facets[np.argsort(throats.facet_throat[facets], kind="stable")]
+    return facets, np.searchsorted(throats.facet_throat[facets], np.arange(len(throats) + 1))
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _section_friction(
+    first, further, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas, images,
+    inscribed, slip, c1, c2, conductivity,
+):  # fmt: skip
+    """Length of each throat over the friction of its sections, 0 without a fluid area."""
+    for t in prange(first.shape[0]):
+        conductivity[t] = 0.0
+        if areas[t] <= 0.0:
+            continue
+        f = first[t]
+        count = 1 + starts[t + 1] - starts[t]
+        radii = np.zeros(3 * count)
+        angles = np.zeros(3 * count)
+        wall = _discs(f, facet_vertices, n, points, sizes, slip, radii[:3], angles[:3])
+        for i in range(1, count):
+            wall += _discs(
+                further[starts[t] + i - 1], facet_vertices, n, points, sizes, slip,
+                radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3],
+            )  # fmt: skip
+        turn = angles.sum()
+        widest = radii.max()
+        equal = np.sqrt(images[t] * areas[t] / np.pi)
+        radius = 0.0
+        for v in range(radii.shape[0]):
+            if radii[v] > 0.0:
+                radius += angles[v] * np.cbrt(radii[v] / widest)
+        radius = widest * (radius / turn) ** 3
+        shape = (
+            areas[t], wall, radii, angles, images[t], inscribed[t] / equal if inscribed[t] > 0.0 else 1.0,
+            radius, c1, c2,
+        )  # fmt: skip
+        neck = np.sqrt(2.0 * areas[t] / turn)
+        low = STRETCH * _dot(
+            _minus(_at(facet_cells[f, 0], vertices), _at(facet_vertices[f, 0], points)), _at(f, normals)
+        )
+        high = low + STRETCH * lengths[t]
+        near, far = min(abs(low), abs(high)), max(abs(low), abs(high))
+        if high - low < 1e-9 * widest:
+            conductivity[t] = 1.0 / _friction(near, shape)
+        elif low < 0.0 and high > 0.0:
+            total = _between(0.0, near, widest, neck, shape) + _between(0.0, far, widest, neck, shape)
+            conductivity[t] = (high - low) / total
+        else:
+            conductivity[t] = (high - low) / _between(near, far, widest, neck, shape)
+
+
+@njit(cache=True)
+def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
+    """Radii of the spheres of facet f and its angles there; returns the length of its edges on no-slip walls."""
+    a = facet_vertices[f, 0]
+    b = facet_vertices[f, 1]
+    c = facet_vertices[f, 2]
+    radii[0] = sizes[a]
+    if b >= n:
+        angles[0] = 0.5 * np.pi
+        on_b = 0.0 if slip[b - n] else _height(a, c, points, sizes)
+        on_c = 0.0 if slip[c - n] else _height(a, b, points, sizes)
+        return on_b + on_c
+    ab = _towards(a, b, n, points)
+    ac = _towards(a, c, n, points)
+    cross = _cross(ab, ac)
+    twice = np.sqrt(_dot(cross, cross))
+    angles[0] = np.arctan2(twice, _dot(ab, ac))
+    radii[1] = sizes[b]
+    if c >= n:
+        angles[1] = np.pi - angles[0]
+        return 0.0 if slip[c - n] else twice
+    angles[1] = np.arctan2(twice, _dot(_minus(ab, ac), ab))
+    radii[2] = sizes[c]
+    angles[2] = np.pi - angles[0] - angles[1]
+    return 0.0
+
+
+@njit(cache=True)
+def _friction(s, shape):
+    """Resistance of a unit of length at height s over the neck."""
+    area, perimeter, radii, angles, images, roundness, radius, c1, c2 = shape
+    for v in range(radii.shape[0]):
+        r = radii[v]
+        least = LEAST_DISC * r
+        if s > r:
+            least *= (r / s) ** 2
+        area += 0.5 * angles[v] * min(s, r) ** 2
+        perimeter += angles[v] * np.sqrt(max((r - s) * (r + s), least**2))
+    opening = roundness * max(np.sqrt(images * area / np.pi), 2.0 * area / perimeter)
+    return (c1 * perimeter + 2.0 * c2 * area / radius) / (area * area * opening)
+
+
+@njit(cache=True)
+def _between(low, high, widest, neck, shape):
+    """Friction between two heights, 0 <= low < high.
+
+    From the neck to the poles of the widest sphere in t, s = r t (3 - t²) / 2, where the perimeter has no root, and
+    points are as dense as the neck, of the length given, asks for. Beyond in the logarithm of s.
+    """
+    total = 0.0
+    if high > widest:
+        begin = np.log(max(low / widest, 1.0))
+        end = np.log(high / widest)
+        for i in range(_NODES.shape[0]):
+            s = widest * np.exp(begin + (end - begin) * _NODES[i])
+            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, shape)
+    if low >= widest:
+        return total
+    e = neck / widest
+    begin = 2.0 * np.sin(np.arcsin(low / widest) / 3.0)
+    end = 2.0 * np.sin(np.arcsin(min(high / widest, 1.0)) / 3.0)
+    begin /= np.sqrt(begin * begin + e * e)
+    end /= np.sqrt(end * end + e * e)
+    for i in range(_NODES.shape[0]):
+        v = begin + (end - begin) * _NODES[i]
+        root = np.sqrt(1.0 - v * v)
+        t = e * v / root
+        rate = 1.5 * widest * (1.0 - t * t) * e / root**3
+        total += (end - begin) * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), shape)
+    return total
