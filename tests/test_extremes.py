@@ -431,7 +431,7 @@ def test_an_interruption_leaves_what_existed_and_nothing_half_written(project, a
         assert after > 0.0 and "permeability" in results.read(project / "results").summary
         assert sorted(path.name for path in project.iterdir()) == ["results", "scene.toml"]
         return
-    # Python may hand the signal on as it exits, where it came while numba ran code from text: to a shell that is 130 too.
+    # Python may hand the signal on as it exits, where it came while code from text ran: to a shell that is 130 too.
     assert process.returncode in (130, -signal.SIGINT), said
     assert "interrupted; nothing was written" in said and "Traceback" not in said
     assert untouched(project)
