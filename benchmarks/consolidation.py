@@ -21,7 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
+from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
+from porefv.conductance import MODELS, ConductanceModel
 from porefv.coupling import Coupling
 from porefv.coupling.ends import permeameter
 from porefv.dem import DEM, Material, Plate, UniformSizes, checkpoint, grow
@@ -82,13 +83,25 @@ def dry(grains: int, stress: float, store: Path) -> dict:
     return json.loads(path.read_text())
 
 
-def permeability(packing: Packing) -> dict:
+def permeability(packing: Packing, model: ConductanceModel | None = None) -> dict:
     """Permeability [m²] over the whole height, and between taps, and how deep the ends are [m]."""
     mesh = PoreMesh(packing)
-    whole = PoreFlow(mesh, Walls.along("z", slip=True)).permeability
-    taps = permeameter(mesh, throat_conductances(mesh, PoreFlow(mesh, DRAINED).conductance, DRAINED.slip, 1.0), 2)
+    model = model or HydraulicRadius()
+    whole = PoreFlow(mesh, Walls.along("z", slip=True), conductance=model).permeability
+    taps = permeameter(mesh, throat_conductances(mesh, model, DRAINED.slip, 1.0), 2)
     assert taps is not None
     return {"whole": whole, "taps": taps.mobility, "depths": taps.depths}
+
+
+def print_ends(grains: int, store: Path) -> None:
+    """How deep the ends are by each model of conductance, in mean radii."""
+    dem = sample(grains, store)
+    for name, model in MODELS.items():
+        found = permeability(dem.packing, model())
+        depths = np.array(found["depths"]) / dem.radii.mean()
+        print(
+            f"{grains} grains, {name}: k {found['taps']:.4g} m² between taps, ends {depths[0]:.2f} and {depths[1]:.2f} radii"
+        )
 
 
 def consolidation(grains: int, stress: float, store: Path, **options) -> dict:
@@ -223,10 +236,15 @@ def main() -> None:
     parser.add_argument("--store", type=Path, default=Path("consolidation"), help="directory for runs")
     parser.add_argument("--exchange", default="facets", help="facets or volumes")
     parser.add_argument("--out", type=Path, help="picture to draw")
+    parser.add_argument("--ends", action="store_true", help="only say how deep the ends are, by model of conductance")
     parser.add_argument("--plain", action="store_true", help="without the correction of the ends, too")
     options = parser.parse_args()
     options.store.mkdir(exist_ok=True)
     corrected = {}
+    if options.ends:
+        for grains in options.grains:
+            print_ends(grains, options.store)
+        return
     for grains in options.grains:
         for ends in (True, False) if options.plain else (True,):
             other = {} if options.exchange == "facets" else {"exchange": options.exchange}
