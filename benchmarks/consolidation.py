@@ -100,7 +100,8 @@ def print_ends(grains: int, store: Path) -> None:
         found = permeability(dem.packing, model())
         depths = np.array(found["depths"]) / dem.radii.mean()
         print(
-            f"{grains} grains, {name}: k {found['taps']:.4g} m² between taps, ends {depths[0]:.2f} and {depths[1]:.2f} radii"
+            f"{grains} grains, {name}: k {found['taps']:.4g} m² between taps, "
+            f"ends {depths[0]:.2f} and {depths[1]:.2f} radii"
         )
 
 
