@@ -66,6 +66,7 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
             factor_mobilities=coupling._pores.factor_mobilities,
             pressure=coupling._pressure,
             rate=coupling._rate,
+            products=coupling._products,
         )
 
 
@@ -121,6 +122,9 @@ def _build(header: dict[str, Any], content: dict[str, np.ndarray], path: str | P
         if array.shape != coupling._pressure.shape:
             raise ValueError(f"{name[1:]} has {array.shape} values, not {coupling._pressure.shape}")
         setattr(coupling, name, array)
+    if content["products"].shape not in ((2, 0), (2, len(coupling._pressure))):
+        raise ValueError(f"products have shape {content['products'].shape}")
+    coupling._products = content["products"]
     coupling._fresh = bool(header["fresh"])
     coupling._pores.factor_mobilities = content["factor_mobilities"]
     return coupling

@@ -31,6 +31,8 @@ SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 _EXPLICIT, _UNSTABLE = 0.1, 1.8
 # Bound on the power's relative error where pressures start anew on another mesh.
 _ANEW = 1e-8
+# Steps after which products of pressures with the matrix are worked out, not carried on, lest rounding gathers.
+_ANEW_EVERY = 50
 # Up to so many unknowns threads gain less than waiting for each other costs.
 _ALONE = 30_000
 # Steps between two looks at how far grains have moved.
@@ -114,6 +116,7 @@ class Coupling:
     _pores: PoreFluid
     _pressure: np.ndarray  # of the free pores
     _rate: np.ndarray  # what the last step changed them by
+    _products: np.ndarray  # (2, n_free): products of both with the matrix; (2, 0) where that is not steady
     _fresh: bool  # whether they are yet to be found on this mesh
     _moves: np.ndarray
 
@@ -176,11 +179,21 @@ class Coupling:
             moves[_WALL_ROWS, _WALL_AXES] = _OUTWARD * wall_speeds
         with self._timed("pressure"):
             # Half of what the last step changed: all of it would pass its noise on.
-            guess = self._pressure + 0.5 * self._rate
+            guess, product = self._pressure + 0.5 * self._rate, None
+            steady = self._pores.is_steady(wall_mobilities)
+            if steady and self._products.size and self.effort.steps % _ANEW_EVERY:
+                product = self._products[0] + 0.5 * self._products[1]
             tolerance = min(self.tolerance, _ANEW) if self._fresh else self.tolerance
             with threads(1 if len(guess) <= _ALONE else get_num_threads()):
-                pressure, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance)
-            self._rate = np.zeros_like(pressure) if self._fresh else pressure - self._pressure
+                pressure, product, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance, product)
+            # The change is kept only where its product with the matrix is known too, or is not needed.
+            goes_on = not self._fresh and (self._products.size > 0 or not steady)
+            self._rate = pressure - self._pressure if goes_on else np.zeros_like(pressure)
+            if steady:
+                change = product - self._products[0] if goes_on else np.zeros_like(product)
+                self._products = np.stack([product, change])
+            else:
+                self._products = np.zeros((2, 0))
             self._pressure, self._fresh = pressure, False
         with self._timed("forces"):
             forces = self._pores.forces(pressure)
@@ -251,6 +264,7 @@ class Coupling:
             self._mean_radius = float(packing.radii.mean())
             self._closed = bool(np.isnan(pressures).all())
             self._pressure, self._rate = np.zeros((2, np.count_nonzero(self._pores.free)))
+            self._products = np.zeros((2, 0))
             self._fresh = True
             self._moves = np.zeros((len(packing) + 6, 3))
         self.effort.meshes += 1

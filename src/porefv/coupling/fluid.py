@@ -89,6 +89,8 @@ class PoreFluid:
         self._of_held = exchange.between(np.where(self._node < 0, mesh.cell_pore, -1))
         free = int(np.count_nonzero(self.free))
         self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
+        faces = mesh.wall_faces
+        self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
         # What walls yielded when the factor was made; empty before.
         self.factor_mobilities = np.zeros(0)
         self._factor: ApproximateCholesky | DragFactor | None = None
@@ -111,9 +113,14 @@ class PoreFluid:
     # ---- solving ------------------------------------------------------------------------------------------------
 
     def solve(
-        self, velocities: np.ndarray, wall_mobilities: np.ndarray, guess: np.ndarray, tolerance: float
-    ) -> tuple[np.ndarray, int]:
-        """Pressures of the free pores, and iterations.
+        self,
+        velocities: np.ndarray,
+        wall_mobilities: np.ndarray,
+        guess: np.ndarray,
+        tolerance: float,
+        product: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Pressures of the free pores, their product with the matrix, and iterations.
 
         Parameters
         ----------
@@ -125,6 +132,8 @@ class PoreFluid:
             Where to start [Pa].
         tolerance : float
             Bound on the error of the pressures, relative, in the norm √(pᵀ (G + E D Eᵀ) p): that of power.
+        product : (n_free,) array, optional
+            (G + E D Eᵀ) × guess, where it is known [m³/s].
 
         Raises
         ------
@@ -146,8 +155,10 @@ class PoreFluid:
             self._of_free.rows, self._of_free.gradients, self._of_free.nodes, self._starts, self._columns,
             self.network.links, self.network.leaks, self.mobilities, wall_mobilities, self._room_for_forces,
         )  # fmt: skip
-        _multiply(*arguments, x, aq)
-        r = rhs - aq
+        if product is None:
+            _multiply(*arguments, x, aq)
+            product = aq
+        r = rhs - product
         size = _weighted_square(r, self._weights)
         rz = self._factor.apply(r, z, room)
         q[:] = z
@@ -159,7 +170,7 @@ class PoreFluid:
             before, size = size, _weighted_square(r, self._weights)
             if rz * size / before <= tolerance**2 * abs(_dot(x, rhs)):
                 # By the diagonal so much less is left that the factor, which costs most, need not be asked.
-                return x, iterations
+                return x, rhs - r, iterations
             new = self._factor.apply(r, z, room)
             _redirect(q, z, new / rz)
             rz = new
@@ -168,7 +179,11 @@ class PoreFluid:
                 f"the pressures of moving pores were not found in {iterations} iterations; a larger tolerance, or a "
                 "smaller contrast of grain sizes, makes it easier"
             )
-        return x, iterations
+        return x, rhs - r, iterations
+
+    def is_steady(self, wall_mobilities: np.ndarray) -> bool:
+        """Whether the matrix stays as it is from step to step: no wall with free pores on it yields."""
+        return not wall_mobilities[self._walls_of_free].any()
 
     def _make_factor(self, wall_mobilities: np.ndarray) -> ApproximateCholesky | DragFactor:
         """Of the matrix itself where drag rules it, else of the network with a part of the drag in its throats."""
