@@ -1,6 +1,7 @@
 """What the tests share: packings (the references of data/, lattices, random ones) and reference values."""
 
 import json
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 
@@ -65,6 +66,40 @@ def unit_flow():
         return PoreFlow(mesh, walls, Fluid(viscosity=1.0, density=1.0), model, **options)
 
     return unit_flow
+
+
+@pytest.fixture(scope="session")
+def exact_solution():
+    """exact_solution(pairs, conductances, fixed): see `solve_exactly`."""
+    return solve_exactly
+
+
+def solve_exactly(pairs, conductances, fixed):
+    """Pressures of a network in rational numbers, by elimination."""
+    n = len(fixed)
+    free = [i for i in range(n) if np.isnan(fixed[i])]
+    row = {i: k for k, i in enumerate(free)}
+    a = [[Fraction(0)] * (len(free) + 1) for _ in free]
+    for (i, j), k in zip(pairs.tolist(), conductances.tolist(), strict=True):
+        for u, v in ((i, j), (j, i)):
+            if u in row:
+                a[row[u]][row[u]] += Fraction(k)
+                if v in row:
+                    a[row[u]][row[v]] -= Fraction(k)
+                else:
+                    a[row[u]][-1] += Fraction(k) * Fraction(float(fixed[v]))
+    for k in range(len(free)):
+        for r in range(k + 1, len(free)):
+            factor = a[r][k] / a[k][k]
+            if factor:
+                a[r] = [x - factor * y for x, y in zip(a[r], a[k], strict=True)]
+    x = [Fraction(0)] * len(free)
+    for k in reversed(range(len(free))):
+        x[k] = (a[k][-1] - sum(a[k][c] * x[c] for c in range(k + 1, len(free)))) / a[k][k]
+    pressure = [Fraction(0) if np.isnan(p) else Fraction(float(p)) for p in fixed]
+    for i, value in zip(free, x, strict=True):
+        pressure[i] = value
+    return pressure
 
 
 def make_lattice(kind, m, radius=None, spacing=1.0):

@@ -12,9 +12,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.errors import ComputationError, InputError
 from porefv.network import Network
-from porefv.solvers import DIRECT_LIMIT, SOLVERS, Solver, solve
+from porefv.solvers import DIRECT_LIMIT, SOLVERS, TOLERANCE, Solver
 
 METHODS = ["direct", "cg"]
+
+
+def solve(network, rhs, solver="auto", tolerance=TOLERANCE):
+    return Solver(network, solver).solve(rhs, tolerance)
 
 
 def grid_links(m):

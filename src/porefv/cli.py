@@ -111,9 +111,10 @@ def _count(text: str) -> int:
 def _pack(options: argparse.Namespace) -> None:
     from porefv.dem import motion
     from porefv.pack_scene import PackProgress, PackScene, outcome
+    from porefv.threads import limit_threads
 
     scene = PackScene.read(options.scene)
-    _limit(options.threads)
+    limit_threads(options.threads)
     progress = PackProgress(scene.stages, quiet=options.quiet)
     if not _compiled(motion.advance):
         progress.note("compiling for this machine, this once; it takes about half a minute")
@@ -127,9 +128,10 @@ def _solve(options: argparse.Namespace) -> None:
     from porefv.report import outcome
     from porefv.results import read
     from porefv.scene import Scene
+    from porefv.threads import limit_threads
 
     scene = Scene.read(options.scene)
-    _limit(options.threads)
+    limit_threads(options.threads)
     progress = Progress(scene.stages, quiet=options.quiet)
     _announce_compilation(progress)
     directory = scene.solve(force=options.force, progress=progress)
@@ -207,11 +209,3 @@ def _compiled(kernel: Any) -> bool:
     """Whether numba has a kernel compiled in an earlier run."""
     name = f"{kernel.__module__.rpartition('.')[2]}.{kernel.__name__}"
     return any(Path(kernel.stats.cache_path or "").glob(f"{name}-*.nbi"))
-
-
-def _limit(threads: int | None) -> None:
-    """Compute with at most so many threads."""
-    if threads:
-        import numba
-
-        numba.set_num_threads(min(threads, numba.get_num_threads()))

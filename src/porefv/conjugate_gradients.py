@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit, prange
 
 from porefv.network import Network
-from porefv.threads import threads
+from porefv.threads import threads_for
 
 _BLOCK = 16384
 # By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
@@ -24,8 +24,6 @@ _MAX_ITERATIONS = 500
 _EPSILON = float(np.finfo(float).eps)
 # Iterations between two looks at what the tolerance is measured against.
 _LOOK_EVERY = 4
-# Up to so many unknowns threads gain less than waiting for each other costs; on a busy machine it costs most of all.
-_ALONE = 30_000
 
 
 class Preconditioner(Protocol):
@@ -63,7 +61,7 @@ def conjugate_gradients(
     -------
     x (n,), number of iterations
     """
-    with threads(1 if len(network) <= _ALONE else get_num_threads()):
+    with threads_for(len(network)):
         return _iterate(network, rhs, preconditioner, tolerance, guess)
 
 
@@ -149,7 +147,7 @@ def refined(
     Refined
         Its best, whether or not it meets both.
     """
-    with threads(1 if len(network) <= _ALONE else get_num_threads()):
+    with threads_for(len(network)):
         x, rest = np.zeros((2, len(network)))
         total, best = 0, None
         while True:

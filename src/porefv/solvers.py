@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.conjugate_gradients import conjugate_gradients, imbalance, refined
 from porefv.errors import ComputationError, InputError
 from porefv.network import Network
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 SOLVERS = ("auto", "direct", "cg")
 
@@ -221,13 +225,6 @@ def solve_split(
     return SplitSolution(found.x, found.rest, report)
 
 
-def solve(
-    network: Network, rhs: np.ndarray, solver: str = "auto", tolerance: float = TOLERANCE
-) -> tuple[np.ndarray, SolverReport]:
-    """Solve A x = b on a network, once (see `Solver`)."""
-    return Solver(network, solver).solve(rhs, tolerance)
-
-
 def _driven(network: Network, rhs: np.ndarray) -> bool:
     """Whether some part of the network is held at different pressures."""
     from scipy.sparse.csgraph import connected_components
@@ -241,21 +238,20 @@ def _driven(network: Network, rhs: np.ndarray) -> bool:
     return bool(np.any(highest - lowest > 1e-9 * np.abs(values).max()) or np.any(rhs[network.leaks == 0.0] != 0.0))
 
 
-class DirectFactor:
-    """Sparse factor of a network (SuperLU, minimum degree)."""
+class SparseFactor:
+    """Sparse factor of a symmetric positive definite matrix (SuperLU, minimum degree)."""
 
-    def __init__(self, network: Network):
-        import scipy.sparse as sparse
+    def __init__(self, matrix: sparse.csr_array):
+        from scipy import sparse
         from scipy.sparse.linalg import splu
 
-        self.network = network
         # Scaled to a unit diagonal: units and contrast then do not meet the factorisation's thresholds.
-        self.scale = 1.0 / np.sqrt(network.diagonal)
+        self.scale = 1.0 / np.sqrt(matrix.diagonal())
         scale = sparse.diags_array(self.scale)
-        matrix = (scale @ network.to_matrix() @ scale).tocsc()
+        scaled = (scale @ matrix @ scale).tocsc()
         try:
             self.factor = splu(
-                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+                scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         except RuntimeError:
             raise ComputationError(
@@ -267,6 +263,14 @@ class DirectFactor:
         np.multiply(self.scale, r, out=y)
         np.multiply(self.scale, self.factor.solve(y), out=z)
         return float(r @ z)
+
+
+class DirectFactor(SparseFactor):
+    """Sparse factor of a network."""
+
+    def __init__(self, network: Network):
+        super().__init__(network.to_matrix())
+        self.network = network
 
     def solve(self, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
         """x (n,), refined until its imbalance is below the tolerance, and the number of refinements."""

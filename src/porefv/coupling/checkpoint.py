@@ -47,7 +47,7 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
         "porefv": __version__,
         "walls": {name: asdict(wall) for name, wall in zip(WALLS, coupling.walls, strict=True)},
         "fluid": asdict(coupling.fluid),
-        "conductance": {"name": coupling.conductance.name, **_parameters(coupling.conductance)},
+        "conductance": {"name": coupling.conductance.name, **vars(coupling.conductance)},
         "options": coupling.options,
         "effort": asdict(coupling.effort),
         "fresh": coupling._fresh,
@@ -80,28 +80,9 @@ def load(path: str | PathLike[str]) -> Coupling:
     InputError
         If the file cannot be read, is damaged, of another program, or of a newer format.
     """
-    content = grains_checkpoint.read(path)
-    try:
-        header = json.loads(str(content["header"]))
-        if header["format"] != FORMAT:
-            raise ValueError(f"its format is {header['format']!r}")
-        version = int(header["version"])
-        if version <= VERSION:
-            return _build(header, content, path)
-    except (KeyError, TypeError, ValueError) as error:
-        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise InputError(
-            f"{path} is not a checkpoint of a coupled run, or it is damaged ({reason}). Give another checkpoint, or "
-            "start the run anew"
-        ) from None
-    raise InputError(
-        f"{path} has format {version}, written by porefv {header.get('porefv', '(unknown)')}; this one, porefv "
-        f"{__version__}, reads formats to {VERSION}. Install the newer porefv to load it"
+    return grains_checkpoint.build(
+        grains_checkpoint.read(path), path, FORMAT, VERSION, lambda header, content: _build(header, content, path)
     )
-
-
-def _parameters(conductance: Any) -> dict[str, float]:
-    return {name: value for name, value in vars(conductance).items()}
 
 
 def _build(header: dict[str, Any], content: dict[str, np.ndarray], path: str | PathLike[str]) -> Coupling:

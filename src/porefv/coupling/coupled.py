@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import get_num_threads
 
 from porefv.boundary import Walls
 from porefv.conductance import ConductanceModel, HydraulicRadius
@@ -22,7 +21,7 @@ from porefv.errors import InputError
 from porefv.flow import Fluid, throat_conductances
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
-from porefv.threads import threads
+from porefv.threads import threads_for
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
@@ -33,8 +32,6 @@ _EXPLICIT, _UNSTABLE = 0.1, 1.8
 _ANEW = 1e-8
 # Steps after which products of pressures with the matrix are worked out, not carried on, lest rounding gathers.
 _ANEW_EVERY = 50
-# Up to so many unknowns threads gain less than waiting for each other costs.
-_ALONE = 30_000
 # Steps between two looks at how far grains have moved.
 _STRIDE = 10
 # The walls in arrays of grains and walls, and the sense of their outward normals.
@@ -150,7 +147,6 @@ class Coupling:
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()
         self.conductance = conductance if conductance is not None else HydraulicRadius()
-        self.tolerance, self.renewal = tolerance, renewal
         self.effort = Effort()
         self._set_out(start if start is not None else Packing(grains.positions, grains.radii, grains.box))
 
@@ -165,7 +161,7 @@ class Coupling:
             If the motion runs away, or pressures cannot be found.
         """
         for _ in range(steps):
-            if self.effort.steps % _STRIDE == 0 and self._moved() > self.renewal:
+            if self.effort.steps % _STRIDE == 0 and self._moved() > self.options["renewal"]:
                 self._renew()
             self._step()
 
@@ -174,8 +170,10 @@ class Coupling:
             predicted, wall_speeds, _, wall_mobilities = self.grains.predict()
             self._refuse_no_way_out(wall_speeds, wall_mobilities)
             moves = self._moves
-            moves[:-6] = predicted if self.scheme == "implicit-drag" else self._last_velocities()
-            moves[-6:] = self.grains.wall_velocities
+            if self.scheme == "implicit-drag":
+                moves[:-6], moves[-6:] = predicted, self.grains.wall_velocities
+            else:
+                moves[:] = self._velocities()
             moves[_WALL_ROWS, _WALL_AXES] = _OUTWARD * wall_speeds
         with self._timed("pressure"):
             # Half of what the last step changed: all of it would pass its noise on.
@@ -183,8 +181,9 @@ class Coupling:
             steady = self._pores.is_steady(wall_mobilities)
             if steady and self._products.size and self.effort.steps % _ANEW_EVERY:
                 product = self._products[0] + 0.5 * self._products[1]
-            tolerance = min(self.tolerance, _ANEW) if self._fresh else self.tolerance
-            with threads(1 if len(guess) <= _ALONE else get_num_threads()):
+            asked = self.options["tolerance"]
+            tolerance = min(asked, _ANEW) if self._fresh else asked
+            with threads_for(len(guess)):
                 pressure, product, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance, product)
             # The change is kept only where its product with the matrix is known too, or is not needed.
             goes_on = not self._fresh and (self._products.size > 0 or not steady)
@@ -202,12 +201,6 @@ class Coupling:
             self.grains.correct(forces[:-6], thrusts)
         self.effort.steps += 1
         self.effort.iterations += iterations
-
-    def _last_velocities(self) -> np.ndarray:
-        """Velocities of the grains before the step, by row."""
-        velocities = np.empty_like(self._moves[:-6])
-        velocities[self.grains.slots] = self.grains.velocities
-        return velocities
 
     def _refuse_no_way_out(self, wall_speeds: np.ndarray, wall_mobilities: np.ndarray) -> None:
         """An incompressible fluid needs an open wall, or one that yields, where others move."""

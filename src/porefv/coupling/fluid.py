@@ -19,7 +19,7 @@ from porefv.flow import held_pressures
 from porefv.mesh import PoreMesh
 from porefv.network import Network
 from porefv.pressure import free_network, reached
-from porefv.solvers import Solver
+from porefv.solvers import Solver, SparseFactor
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -93,7 +93,7 @@ class PoreFluid:
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
         # What walls yielded when the factor was made; empty before.
         self.factor_mobilities = np.zeros(0)
-        self._factor: ApproximateCholesky | DragFactor | None = None
+        self._factor: ApproximateCholesky | SparseFactor | None = None
         self.set_pressures(pressures)
 
     def set_pressures(self, pressures: np.ndarray) -> None:
@@ -185,7 +185,7 @@ class PoreFluid:
         """Whether the matrix stays as it is from step to step: no wall with free pores on it yields."""
         return not wall_mobilities[self._walls_of_free].any()
 
-    def _make_factor(self, wall_mobilities: np.ndarray) -> ApproximateCholesky | DragFactor:
+    def _make_factor(self, wall_mobilities: np.ndarray) -> ApproximateCholesky | SparseFactor:
         """Of the matrix itself where drag rules it, else of the network with a part of the drag in its throats."""
         mesh = self.mesh
         drags = np.zeros(mesh.n_spheres + 6)
@@ -204,12 +204,12 @@ class PoreFluid:
         if not (leaks.any() or network.leaks.any()):  # pressures are defined up to a constant: any will do
             leaks[0] = network.diagonal[0]
         if len(network) <= _FACTORED and np.median(drag) > _RULING * np.median(self.conductances):
-            return DragFactor(self._drag_matrix() + _diagonal(leaks) + self.network.to_matrix())
+            return SparseFactor(self._matrix(leaks))
         leaks, diagonal = network.leaks + leaks, network.diagonal + leaks
         return ApproximateCholesky.of(Network(network.starts, network.columns, network.links, leaks, diagonal))
 
-    def _drag_matrix(self) -> sparse.csr_array:
-        """E D Eᵀ of the grains, between free pores."""
+    def _matrix(self, leaks: np.ndarray) -> sparse.csr_array:
+        """G + E D Eᵀ of the grains, between free pores, and further leaks: pores couple through every grain."""
         from scipy import sparse
 
         n, free = len(self.mobilities), self._of_free
@@ -218,7 +218,8 @@ class PoreFluid:
         shape = len(self.network), 3 * (n + 6)
         operator = sparse.csr_array((free.gradients.ravel(), (rows, columns)), shape=shape)
         mobilities = np.repeat(np.append(self.mobilities, np.zeros(6)), 3)
-        return (operator @ sparse.diags_array(mobilities) @ operator.T).tocsr()
+        drag = operator @ sparse.diags_array(mobilities) @ operator.T
+        return (drag + sparse.diags_array(leaks) + self.network.to_matrix()).tocsr()
 
     # ---- what follows from the pressures ------------------------------------------------------------------------
 
@@ -286,33 +287,6 @@ class PoreFluid:
                 break
             moves[:-6] = root**2 * forces[:-6] / largest
         return largest
-
-
-def _diagonal(values: np.ndarray) -> sparse.dia_array:
-    from scipy import sparse
-
-    return sparse.diags_array(values)
-
-
-class DragFactor:
-    """Sparse factor of G + E D Eᵀ as a preconditioner: pores couple through every grain, so it fills."""
-
-    def __init__(self, matrix: sparse.csr_array):
-        from scipy import sparse
-        from scipy.sparse.linalg import splu
-
-        self.scale = 1.0 / np.sqrt(matrix.diagonal())
-        scale = sparse.diags_array(self.scale)
-        self.factor = splu(
-            (scale @ matrix @ scale).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )  # fmt: skip
-
-    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
-        """z = A⁻¹ r; returns r·z. `y` is room to work in."""
-        np.multiply(self.scale, r, out=y)
-        np.multiply(self.scale, self.factor.solve(y), out=z)
-        return _dot(r, z)
 
 
 @njit(cache=True, nogil=True)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Callable
 from dataclasses import asdict
 from os import PathLike
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from porefv.errors import ComputationError, InputError
 from porefv.io.atomic import atomic_write
 
 FORMAT, VERSION = "porefv.dem", 1
+State = TypeVar("State")
 
 # What a DEM holds between two runs, by attribute. Shapes: n grains, p pairs, k rims, s threads.
 _NUMBERS = {
@@ -118,18 +120,30 @@ def load(path: str | PathLike[str]) -> DEM:
 
 def unpack(content: dict[str, np.ndarray], path: str | PathLike[str]) -> DEM:
     """The DEM whose arrays `pack` gave, read from `path`; errors as `load`."""
+    return build(content, path, FORMAT, VERSION, _build)
+
+
+def build(
+    content: dict[str, np.ndarray],
+    path: str | PathLike[str],
+    name: str,
+    newest: int,
+    make: Callable[[dict[str, Any], dict[str, np.ndarray]], State],
+) -> State:
+    """What `make` makes of the header and the arrays of a checkpoint of that format, up to its newest version."""
     try:
         header = json.loads(str(content["header"]))
-        if header["format"] != FORMAT:
+        if header["format"] != name:
             raise ValueError(f"its format is {header['format']!r}")
         version = int(header["version"])
-        if version <= VERSION:
-            return _build(header, content)
+        if version <= newest:
+            return make(header, content)
     except (KeyError, TypeError, ValueError) as error:
-        raise _unreadable(path, f"{error} is missing" if isinstance(error, KeyError) else str(error)) from None
+        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise _unreadable(path, reason, name) from None
     raise InputError(
         f"{path} has format {version}, written by porefv {header.get('porefv', '(unknown)')}; this one, porefv "
-        f"{__version__}, reads formats to {VERSION}. Install the newer porefv to load it"
+        f"{__version__}, reads formats to {newest}. Install the newer porefv to load it"
     )
 
 
@@ -207,9 +221,9 @@ def read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
         raise _unreadable(path, str(error) or type(error).__name__) from None
 
 
-def _unreadable(path: str | PathLike[str], reason: str) -> InputError:
+def _unreadable(path: str | PathLike[str], reason: str, name: str = FORMAT) -> InputError:
     return InputError(
-        f"{path} is not a checkpoint of porefv.dem, or it is damaged ({reason}). Give another checkpoint, or start the "
+        f"{path} is not a checkpoint of {name}, or it is damaged ({reason}). Give another checkpoint, or start the "
         "run anew"
     )
 

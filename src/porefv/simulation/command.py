@@ -26,14 +26,12 @@ def _simulate(options: argparse.Namespace) -> None:
     from porefv.simulation import SimulationScene
     from porefv.simulation.ledger import read_ledger
     from porefv.simulation.progress import SimulationProgress
+    from porefv.threads import limit_threads
 
     if options.resume and options.force:
         raise InputError("--resume goes on with results that exist, --force replaces them: give one of the two")
     scene = SimulationScene.read(options.scene)
-    if options.threads:
-        import numba
-
-        numba.set_num_threads(min(options.threads, numba.get_num_threads()))
+    limit_threads(options.threads)
     progress = SimulationProgress([stage.name for stage in scene.stages], quiet=options.quiet)
     directory = scene.run(force=options.force, resume=options.resume, progress=progress)
     if not options.quiet:
