@@ -17,10 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import get_num_threads
 
 from porefv.doubling import doubled
 from porefv.errors import ComputationError
+from porefv.kernels import njit, prange
 from porefv.network import Network
 
 _GROUND = -1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from porefv.facets import (
     _at,
@@ -17,6 +16,7 @@ from porefv.facets import (
     centroid,
     spheres_first,
 )
+from porefv.kernels import njit, prange
 
 
 @njit(cache=True)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv import __version__
+from porefv import __version__, memory
 from porefv.errors import PorefvError
 
 if TYPE_CHECKING:
@@ -18,9 +20,12 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input) or 130 (interrupted)."""
-    options = _parser().parse_args(arguments)
     try:
-        options.command(options)
+        options = _parser().parse_args(arguments)
+        with _warnings_in_a_line(quiet=getattr(options, "quiet", False)):
+            if options.command is not _info:
+                memory.ensure_libraries()
+            options.command(options)
         sys.stdout.flush()
         return 0
     except PorefvError as error:
@@ -33,6 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except ModuleNotFoundError as error:
         return _fail(f"the installation is incomplete: {error}. Install porefv again with pip", 1)
+    except ImportError as error:  # of a library that is there
+        return _fail(
+            f"a library cannot be loaded: {error}. Allow more memory (ulimit -v), or install porefv again with pip", 1
+        )
     except MemoryError:
         return _fail("not enough memory; ask for less (quantities, vtk), or use a larger machine", 1)
     except Exception as error:  # the user gets a line, the developer a traceback
@@ -43,6 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "the scene and what the same command prints with POREFV_DEBUG=1 in the environment.",
             1,
         )
+
+
+@contextmanager
+def _warnings_in_a_line(quiet: bool) -> Iterator[None]:
+    """Say warnings as errors are said, or not at all."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: None if quiet else print(f"porefv: {message}", file=sys.stderr)
+        yield
 
 
 def _fail(message: str, status: int) -> int:

@@ -32,7 +32,7 @@ def _import_fipy() -> Any:
         argv, sys.argv = sys.argv, sys.argv[:1]
         try:
             import fipy
-        except ImportError:
+        except ModuleNotFoundError:
             raise MissingExtraError("fipy", "A FiPy mesh") from None
         finally:
             sys.argv = argv

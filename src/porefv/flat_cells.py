@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from porefv.kernels import njit
 
 # A cell whose edges enclose less than this part of the volume of their lengths is flat but for rounding.
 _FLAT = 1e-9

@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike
 
 from porefv.errors import InputError
 from porefv.facets import _height, area_vector, spheres_first
+from porefv.kernels import njit, prange
 
 if TYPE_CHECKING:
     from porefv.dem import Contacts

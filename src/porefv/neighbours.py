@@ -7,10 +7,10 @@ box cost nothing.
 """
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError
+from porefv.kernels import njit, prange
 
 # More neighbours per sphere than this, over a whole cell, cannot come from a packing of grains; it comes from
 # radii and centres in different units, and listing the pairs would exhaust the memory.

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit, prange
+
+from porefv.kernels import njit, prange
 
 if TYPE_CHECKING:
     from scipy import sparse

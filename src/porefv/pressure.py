@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from porefv.errors import ComputationError
+from porefv.kernels import njit
 from porefv.network import Network
 from porefv.solvers import TOLERANCE, SolverReport, solve_split
 from porefv.union_find import join

@@ -272,7 +272,7 @@ class Results:
         path = self._file(name, "set vtk = true")
         try:
             import pyvista
-        except ImportError:
+        except ModuleNotFoundError:
             raise MissingExtraError("pyvista", f"Reading {name}") from None
         return pyvista.read(path)
 

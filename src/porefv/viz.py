@@ -250,7 +250,7 @@ def _pyvista() -> Any:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
         import pyvista
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("pyvista", "Drawing a picture") from None
     _check_drawing()
     return pyvista

@@ -138,7 +138,7 @@ def to_meshio(mesh: PoreMesh) -> meshio.Mesh:
     """
     try:
         import meshio
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("meshio", "PoreMesh.to_meshio()") from None
     solids = polyhedra(mesh)
     blocks = {NAMES[kind]: solids.of_type(kind) for kind in (TETRA, WEDGE, HEXAHEDRON)}
@@ -176,7 +176,7 @@ def to_pyvista(mesh: PoreMesh, **cell_data: Any) -> pyvista.UnstructuredGrid:
     """
     try:
         import pyvista
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("pyvista", "PoreMesh.to_pyvista()") from None
     return pyvista.UnstructuredGrid(cells_grid(mesh, **cell_data))
 
@@ -235,7 +235,7 @@ def vtk_data_model() -> Any:
     # vtkmodules loads in half the time of pyvista, which is not needed to write files.
     try:
         from vtkmodules import vtkCommonDataModel
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("pyvista", "Writing VTK files") from None
     return vtkCommonDataModel
 

@@ -17,9 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from porefv.forces import facet_forces
+from porefv.kernels import njit
 from porefv.mesh import PoreMesh
 from porefv.tessellation.triangulation import wall_normals
 

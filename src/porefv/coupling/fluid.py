@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from porefv.approximate_cholesky import ApproximateCholesky
 from porefv.coupling.exchange import Exchange, gather, spread
 from porefv.errors import ComputationError
 from porefv.flow import held_pressures
+from porefv.kernels import njit
 from porefv.mesh import PoreMesh
 from porefv.network import Network
 from porefv.pressure import free_network, reached

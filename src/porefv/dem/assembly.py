@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import get_num_threads
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
 from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, advance, wall_excess
 from porefv.errors import ComputationError, InputError
+from porefv.kernels import njit
 from porefv.neighbours import neighbour_pairs
 from porefv.packing import WALLS, Box, Packing
 from porefv.tessellation.ordering import morton_codes

@@ -17,7 +17,8 @@ Frictional contacts are worked out a block at a time, from columns of numbers th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from porefv.kernels import njit
 
 # Contacts in a block, and where each quantity's column starts in it: given ...
 _SIZE = 64

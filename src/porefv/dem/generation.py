@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from porefv.dem.assembly import DEM, Material
 from porefv.errors import ComputationError, InputError
+from porefv.kernels import njit
 from porefv.packing import Box, Packing
 
 # Porosity of the cloud that growth starts from.

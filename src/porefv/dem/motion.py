@@ -10,9 +10,9 @@ on the number of shares alone, and one share needs no sums.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
+from porefv.kernels import njit, prange
 
 # Why `advance` came back.
 DONE, CROWDED, RUNAWAY = 0, 1, 2

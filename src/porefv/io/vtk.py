@@ -115,6 +115,6 @@ def _box(path: AnyPath, mesh: Any) -> Box | None:
 def _pyvista(purpose: str) -> Any:
     try:
         import pyvista
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("pyvista", purpose) from None
     return pyvista

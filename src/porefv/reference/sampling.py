@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from porefv.facets import centroid
+from porefv.kernels import njit
 
 if TYPE_CHECKING:
     from porefv.mesh import PoreMesh

@@ -124,7 +124,7 @@ def require_ngsolve() -> None:
     try:
         import netgen.csg  # noqa: F401
         import ngsolve  # noqa: F401
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("ngsolve", "A resolved Stokes reference") from None
 
 

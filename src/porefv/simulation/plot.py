@@ -47,7 +47,7 @@ def series_picture(directory: str | PathLike[str]) -> Any:
     """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`."""
     try:
         from matplotlib.figure import Figure
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("matplotlib", "Drawing time series") from None
     ledger, series = read_ledger(directory), read_series(directory)
     if len(series) == 0:

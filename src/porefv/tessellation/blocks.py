@@ -12,9 +12,10 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import get_num_threads
 
 from porefv import memory
+from porefv.kernels import njit
 from porefv.tessellation import insertion
 from porefv.tessellation.ordering import rounds
 

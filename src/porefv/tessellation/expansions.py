@@ -12,7 +12,8 @@ Every function writes into an array of its caller and returns the number of comp
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from porefv.kernels import njit
 
 _SPLITTER = 134217729.0  # 2**27 + 1 cuts a double in two halves of 26 bits
 

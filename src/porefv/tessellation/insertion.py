@@ -14,9 +14,9 @@ Arrays (capacity m cells)
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from porefv.doubling import doubled
+from porefv.kernels import njit
 from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, power_centre, row, side
 
 # Relative error of a power centre beyond which it is computed again in exact arithmetic.

@@ -8,7 +8,8 @@ sphere short and the memory warm.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from porefv.kernels import njit
 
 _BITS = 20
 

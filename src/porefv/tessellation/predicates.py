@@ -18,8 +18,8 @@ depends on the packing alone, not on the order of its spheres or of their insert
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from porefv.kernels import njit
 from porefv.tessellation.expansions import add, estimate, multiply, sign, two_product, two_sum
 
 EPSILON = 2.0**-53

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from porefv.errors import ComputationError
+from porefv.kernels import njit
 from porefv.packing import Box
 from porefv.tessellation.blocks import triangulate
 from porefv.tessellation.ordering import morton_codes
