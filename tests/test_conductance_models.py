@@ -9,12 +9,13 @@ from scipy.integrate import quad
 
 from porefv.boundary import Walls
 from porefv.conductance import HydraulicRadius, SectionFriction, conductance_model
-from porefv.conductance.sections import LEAST_DISC, STRETCH
+from porefv.conductance.sections import LEAST_DISC, NARROWING, REACH, STRETCH
 from porefv.errors import InputError
 from porefv.flow import Fluid, PoreFlow
 from porefv.forces import facet_forces, fluid_forces
 from porefv.mesh import PoreMesh
 from porefv.packing import Box, Packing
+from porefv.patches import add_patches
 from porefv.reference import StokesReference
 
 STOKES = Path(__file__).parent.parent / "data" / "reference" / "stokes"
@@ -52,15 +53,17 @@ def rms(values):
 
 def test_permeabilities_of_cases_its_constants_are_not_fitted_to():
     found = errors(OTHERS, SectionFriction())
-    assert rms(found) < 0.05  # 4.2 %
-    assert np.abs(found).max() < 0.07  # 6.0 %, touching spheres on a face-centred lattice
-    assert rms(found) < 0.3 * rms(errors(OTHERS, HydraulicRadius()))
+    assert rms(found) < 0.03  # 2.2 %
+    assert np.abs(found).max() < 0.05  # 4.6 %, touching spheres on a body-centred lattice
+    papers = errors(OTHERS, HydraulicRadius())
+    assert rms(found) < 0.15 * rms(papers)
+    assert (np.abs(found) < np.abs(papers)).all()
 
 
 def test_permeabilities_of_cases_it_was_fitted_to():
     found = errors(FITTED, SectionFriction())
-    assert rms(found) < 0.06  # 4.9 %; 107 % by the hydraulic radius
-    assert np.abs(found).max() < 0.12  # 10.5 %
+    assert rms(found) < 0.04  # 3.4 %; 107 % by the hydraulic radius
+    assert np.abs(found).max() < 0.08  # 7.3 %
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -70,10 +73,21 @@ def test_flow_through_random_packings(reference, values, unit_flow, name, kind):
     exact = np.array([sphere["total"] for sphere in fem["spheres"]])
     walls = Walls.along("y", slip=kind == "symmetry")
     flow, paper = (unit_flow(PoreMesh(reference(name)), walls, model) for model in (SectionFriction(), None))
-    assert_allclose(flow.permeability, fem["K"], rtol=0.06)
+    assert_allclose(flow.permeability, fem["K"], rtol=0.01)
     error, papers = (np.linalg.norm(found.forces.total - exact) / np.linalg.norm(exact) for found in (flow, paper))
-    assert error < 0.06  # 3.5 to 5.5 %
-    assert error < 0.7 * papers  # 6.9 to 13.2 %
+    assert error < 0.05  # 3.9 to 4.8 %
+    assert error < 0.6 * papers  # 6.9 to 13.2 %
+
+
+@pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "sc8", "bcc9", "nine_0.4"])
+def test_pressure_and_drag_each_have_their_part(name):
+    # Constant pressures in pores leave drag an eighth to a quarter low: what falls along throats pushes spheres less.
+    ref = stokes(name, "no_slip")
+    for model, (least, most) in ((SectionFriction(), (0.98, 1.07)), (HydraulicRadius(), (0.75, 0.9))):
+        forces = PoreFlow(ref.pore_mesh(), ref.walls, conductance=model).forces
+        drag = forces.viscous[:, 1].sum() + forces.wall_viscous[:, 1].sum()
+        exact = ref.values.sphere_viscous[:, 1].sum() + ref.values.wall_viscous[[0, 1, 4, 5], 1].sum()
+        assert least < drag / exact < most
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -132,7 +146,7 @@ def test_it_is_the_integral_it_says(reference):
     throats, model = mesh.throats, SectionFriction()
     slip = np.zeros(6, bool)
     found = model.conductivity(throats, slip)
-    inscribed = throats.inscribed_radii(slip)
+    inscribed, portions = throats.inscribed_circles(slip)
     ratios = []
     for t, f in enumerate(throats.first_facets):
         corners = mesh.facet_vertices[f]
@@ -145,19 +159,25 @@ def test_it_is_the_integral_it_says(reference):
         angles = np.arccos(cosines)
         neck = throats.fluid_areas[t]
         mean = (angles @ np.cbrt(radii) / np.pi) ** 3
-        roundness = inscribed[t] / np.sqrt(neck / np.pi)
+        roundness = inscribed[t] / np.sqrt(neck / (np.pi * portions[t]))
+        low = (mesh.vertices[mesh.facet_cells[f, 0]] - centres[0]) @ throats.normals[t]
+        high = low + throats.lengths[t]
+        reach = REACH * throats.lengths[t]
+        begin = STRETCH * (low if low < -reach else -reach if low < 0 else low - reach)
+        end = STRETCH * (high if high > reach else reach if high > 0 else high + reach)
 
-        def resistance(s, angles=angles, radii=radii, neck=neck, mean=mean, roundness=roundness):
-            area = neck + 0.5 * angles @ np.minimum(abs(s), radii) ** 2
+        def resistance(s, angles=angles, radii=radii, neck=neck, mean=mean, roundness=roundness,
+                       portion=portions[t], begin=begin, end=end):  # fmt: skip
+            share = 1.0 - NARROWING * s / (end if s > 0 else begin)
+            area = neck + 0.5 * share * angles @ np.minimum(abs(s), radii) ** 2
             beyond = LEAST_DISC * radii / np.maximum(abs(s) / radii, 1.0) ** 2
             disc = np.sqrt(np.maximum(radii**2 - s**2, beyond**2))
             perimeter = angles @ disc
-            opening = roundness * max(np.sqrt(area / np.pi), 2.0 * area / perimeter)
+            opening = roundness**1.5 * max(np.sqrt(area / (np.pi * portion)), 2.0 * area / perimeter)
             return (model.friction * perimeter + 2.0 * model.curvature * area / mean) / (area**2 * opening)
 
-        begin = STRETCH * (mesh.vertices[mesh.facet_cells[f, 0]] - centres[0]) @ throats.normals[t]
-        end = begin + STRETCH * throats.lengths[t]
-        ratios.append(found[t] * quad(resistance, begin, end, limit=200, epsrel=1e-5)[0] / (end - begin))
+        total = quad(resistance, begin, end, points=[0.0] if begin < 0 < end else None, limit=200, epsrel=1e-5)[0]
+        ratios.append(found[t] * total / (STRETCH * throats.lengths[t]))
     assert len(ratios) > 70
     assert_allclose(ratios, 1.0, atol=0.025)  # four points a half: 0.3 % in the mean square
     assert rms(np.array(ratios) - 1.0) < 0.005
@@ -166,7 +186,7 @@ def test_it_is_the_integral_it_says(reference):
 # ---- solid that is added ----------
 
 
-@pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "n200_s1"])
+@pytest.mark.parametrize("name", ["sc8", "n25_s1", "n54_s1", "n200_s1"])
 def test_a_grain_in_the_widest_pore_hardly_ever_raises_the_permeability(reference, name):
     packing = reference(name)
     place, room = widest_pore(packing)
@@ -175,7 +195,8 @@ def test_a_grain_in_the_widest_pore_hardly_ever_raises_the_permeability(referenc
         radii = np.append(packing.radii, size * room)
         more = Packing(np.vstack([packing.centres, place]), radii, packing.box)
         after = PoreFlow(more, Walls.along("y"), conductance=SectionFriction()).permeability
-        assert after < before * (1.006 if size < 1.0 else 1.0)  # +0.55 % at worst; hydraulic radius: +2.4 %
+        # +1.2 % at worst, n25_s1 and sc8; hydraulic radius: +2.4 and +12.4 %
+        assert after < before * (1.013 if size < 1.0 else 1.0)
 
 
 def widest_pore(packing):
@@ -197,6 +218,17 @@ def test_larger_grains_lower_the_permeability(reference):
 
 
 # ---- invariance ----------
+
+
+def test_necks_that_are_nearly_one_conduct_as_one(unit_flow):
+    # Nudged spheres of a cubic lattice cut its square necks in two throats: what these add up to does not jump.
+    nudges = np.random.default_rng(3).uniform(-1.0, 1.0, (8, 3))
+    square = make_eight(0.49)
+    exact = unit_flow(PoreMesh(square), Walls.along("y", slip=True), SectionFriction()).permeability
+    for size in (1e-7, 1e-6, 1e-5):
+        nudged = Packing(square.centres + size * nudges, square.radii, square.box)
+        found = unit_flow(PoreMesh(nudged), Walls.along("y", slip=True), SectionFriction()).permeability
+        assert_allclose(found, exact, rtol=5.0 * size)
 
 
 def test_units_and_order_do_not_matter(reference):
@@ -251,12 +283,62 @@ def test_forces_add_up_to_the_thrust(mesh_of, unit_flow):
             assert forces.conservation_residual < 1e-12
 
 
-def test_shares_of_drag_add_up_and_are_by_surface_for_equal_spheres(mesh_of, lattice):
+def test_what_falls_along_a_throat_adds_up_to_what_drops_across_it(mesh_of):
     mesh, slip = mesh_of("n25_s1"), np.zeros(6, bool)
     by_drag, by_surface = (facet_forces(mesh, slip, shares) for shares in ("drag", "surface"))
     assert_allclose(by_drag.sum(axis=1), by_surface.sum(axis=1), atol=1e-14)
-    equal, slip = PoreMesh(lattice("fcc", 1)), np.ones(6, bool)
-    assert_allclose(facet_forces(equal, slip, "drag"), facet_forces(equal, slip), atol=1e-14)
+
+
+def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
+    # Every facet between three spheres of n25, on triangles of its spheres in 40 000 pieces.
+    mesh = mesh_of("n25_s1")
+    throats, pressure = mesh.throats, np.zeros((len(mesh.facet_cells), 3, 3))
+    add_patches(
+        np.arange(len(pressure)), mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes,
+        mesh.local_vertices, throats.facet_normals, throats.facet_necks, np.ones((len(pressure), 3)), pressure,
+        np.zeros_like(pressure),
+    )  # fmt: skip
+    interior = np.flatnonzero((mesh.facet_vertices < mesh.n_spheres).all(axis=1) & (throats.facet_necks > 0.0))
+    assert len(interior) > 70
+    expected = np.array([patches(mesh, f) for f in interior])
+    assert_allclose(pressure[interior], expected, atol=0.05 * np.abs(expected).max())
+    assert np.linalg.norm(pressure[interior] - expected) < 0.035 * np.linalg.norm(expected)  # six points a patch: 3.1 %
+
+
+def patches(mesh, f):
+    corners = mesh.facet_vertices[f]
+    centres, radii = mesh.packing.centres[corners], mesh.packing.radii[corners]
+    normal, neck = mesh.throats.facet_normals[f], mesh.throats.facet_necks[f]
+    vertices = mesh.vertices[mesh.facet_cells[f]]
+    heights = (vertices - centres[0]) @ normal
+    falls = np.array([fall(STRETCH * min(heights[0], 0.0) / neck), fall(STRETCH * max(heights[1], 0.0) / neck)])
+    parts = falls / (falls[1] - falls[0])  # the vertex's pressure less that of the neck, changed in sign
+    forces = np.zeros((3, 3))
+    for side in (0, 1):
+        for v in range(3):
+            if parts[side] == 0.0:
+                continue
+            rays = np.array([*(np.delete(centres, v, axis=0) - centres[v]), vertices[side] - centres[v]])
+            rays /= np.linalg.norm(rays, axis=1)[:, None]
+            u, w = (np.arange(200) + 0.5) / 200, (np.arange(200) + 0.5) / 200
+            u, w = (x.ravel() for x in np.meshgrid(u, w))
+            points = np.stack([(1 - u) * (1 - w), (1 - u) * w, u], axis=1) @ rays
+            far = np.linalg.norm(points, axis=1)
+            solid_angles = (1 - u) / 200**2 * abs(np.linalg.det(rays)) / far**3
+            out = points / far[:, None]
+            left = 1.0 - fall(STRETCH * radii[v] * (out @ normal) / neck) / falls[side]
+            # Pressure on the patch differs from its pore's by this, and pushes inwards.
+            change = parts[side] * np.maximum(left, 0.0)
+            forces[v] -= radii[v] ** 2 * (solid_angles * change) @ out
+    return forces
+
+
+def fall(x):
+    """Friction of sections that open as 1 + x², ∫ (1 + x²)^{-5/2}."""
+    if np.isscalar(x):
+        return quad(lambda y: (1.0 + y * y) ** -2.5, 0.0, x)[0]
+    sine = x / np.hypot(1.0, x)
+    return sine - sine**3 / 3.0
 
 
 def test_facet_forces_and_fluid_forces_share_alike(reference, unit_flow):

@@ -12,9 +12,9 @@ facets add up to the whole cap, so sums stay exact for any overlap of pairs.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from porefv.doubling import doubled
+from porefv.kernels import njit, prange
 from porefv.union_find import join
 
 
@@ -455,13 +455,13 @@ def row_sums(values):
 
 
 @njit(cache=True, parallel=True)
-def inscribed_circles(facet_vertices, n, points, sizes, slip):
+def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, portions):
     """Radius of the circle in each facet's plane tangent to its spheres and no-slip walls, centred on walls with slip.
 
     With the first centre as origin and x = X₀ + ρ X₁ the centre of the circle, its tangency to the other two is
-    linear in ρ and to the first quadratic. Zero where no such circle exists.
+    linear in ρ and to the first quadratic. Zero where no such circle exists. `portions` are the parts of the circles'
+    areas within the facets: exact where a circle is cut by one edge or two at a right angle.
     """
-    radii = np.zeros(facet_vertices.shape[0])
     for f in prange(facet_vertices.shape[0]):
         a = facet_vertices[f, 0]
         rows = np.empty((2, 2))
@@ -483,6 +483,7 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip):
                 constant[i] = _height(a, m, points, sizes)
                 slope[i] = 0.0 if slip[m - n] else -1.0
         det = rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0]
+        radii[f] = portions[f] = 0.0
         if det == 0.0:
             continue
         x0 = (constant[0] * rows[1, 1] - constant[1] * rows[0, 1]) / det
@@ -498,8 +499,39 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip):
         if qc > 0.0 and discriminant >= 0.0:
             below = np.sqrt(discriminant) - qb
             if below > 0.0:
-                radii[f] = qc / below
-    return radii
+                rho = qc / below
+                radii[f] = rho
+                portions[f] = _portion(facet_vertices[f], (x0 + rho * x1, y0 + rho * y1), rho, rows, n, points, sizes)
+
+
+@njit(cache=True)
+def _portion(vertices, centre, rho, rows, n, points, sizes):
+    """Part of a circle within a facet; `rows`, (2, 2), lead from its first sphere to its other vertices."""
+    a, b, c = vertices
+    corners = np.zeros((4, 2))
+    if c < n:
+        sides = 3
+        corners[1] = rows[0]
+        corners[2] = rows[1]
+    else:
+        sides = 4
+        corners[1] = rows[0] if b < n else _height(a, b, points, sizes) * rows[0]
+        corners[2] = corners[1] + _height(b if b < n else a, c, points, sizes) * rows[1]
+        corners[3] = _height(a, c, points, sizes) * rows[1]
+    portion = 1.0
+    for i in range(sides):
+        start = corners[i]
+        edge = corners[(i + 1) % sides] - start
+        length = np.sqrt(edge[0] ** 2 + edge[1] ** 2)
+        if length == 0.0:
+            continue
+        # Distance of the edge from the centre, over ρ: beyond it lies a segment of the circle.
+        x = (edge[0] * (centre[1] - start[1]) - edge[1] * (centre[0] - start[0])) / (length * rho)
+        if x <= -1.0:
+            return 0.0
+        if x < 1.0:
+            portion *= 1.0 - (np.arccos(x) - x * np.sqrt((1.0 - x) * (1.0 + x))) / np.pi
+    return portion
 
 
 @njit(cache=True)

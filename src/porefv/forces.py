@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from porefv.errors import InputError
 from porefv.facets import row_sums
+from porefv.kernels import njit
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS
+from porefv.patches import add_patches
 
 SHARES = ("surface", "drag")
-# Shear on a sphere with much room, over u / r with u the throat's mean speed: fitted. In an unbounded stream 1.5.
-SHEAR = 1.25
+# Facets whose forces are at hand at a time.
+BLOCK = 1 << 16
+# Shear on a sphere in an unbounded stream of speed u, over u / r (Stokes).
+SHEAR = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +28,7 @@ class Forces:
     Attributes
     ----------
     pressure, viscous, buoyancy : (n, 3) arrays
-        On each sphere: C12 eq. 14, eq. 17-18, and the weight of the fluid displaced, -ρ V g.
+        On each sphere: C12 eq. 14, eq. 17-18 (`fluid_forces`: shares), and the weight of the fluid displaced, -ρ V g.
     wall_pressure, wall_viscous, wall_buoyancy : (6, 3) arrays
         On each wall, in the order x_min, x_max, y_min, ...: the piezometric pressure on it, the drag along it, and
         the hydrostatic pressure on it (zero at the highest corner of the box). Walls of imposed pressure are open:
@@ -101,21 +105,18 @@ def fluid_forces(
     weight : (3,) array, optional
         Weight of a unit volume of fluid, ρ g [N/m³].
     shares : {'surface', 'drag'}
-        How the vertices of a facet share the drag in its throat. By the surface γ^k that is wetted of them, as C12 eq.
-        18; or by γ^k times the shear on it, which on a sphere with much room around goes as 1 / r: drag by radius,
-        as Stokes', not by surface.
+        How a throat's drop of pressure acts on the vertices of its facets. 'surface', as C12 eq. 14-18: pressure drops
+        in the facet's plane, drag goes by the surface γ^k that is wetted. 'drag': pressure falls along the throat
+        (`porefv.patches`), and drag goes by γ^k times the shear on it, which on a sphere with much room around goes as
+        1 / r, by radius as Stokes', and on walls is less by λ, the roundness of the neck, for the cusps along them.
     """
     n = mesh.n_spheres
-    throats = mesh.throats
     on_spheres_p = np.zeros((n + 6, 3))
     on_spheres_v = np.zeros((n + 6, 3))
     cell_pressure = pressure[mesh.cell_pore]
     drops = cell_pressure[mesh.facet_cells[:, 0]] - cell_pressure[mesh.facet_cells[:, 1]]
-    vectors, parts = _drag(mesh, slip, shares)
-    _scatter(
-        mesh.facet_vertices, throats.facet_normals, throats.facet_sectors, vectors, parts, drops,
-        on_spheres_p, on_spheres_v,
-    )  # fmt: skip
+    for rows, by_pressure, by_drag in _unit_forces(mesh, slip, shares):
+        _scatter(mesh.facet_vertices[rows], drops[rows], by_pressure, by_drag, on_spheres_p, on_spheres_v)
 
     faces = mesh.wall_faces
     face_pressure = cell_pressure[faces.cells]
@@ -150,17 +151,21 @@ def fluid_forces(
 
 
 def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> np.ndarray:
-    """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, A^k n + A^f n γ^k/Σγ [m²].
+    """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, pressure and drag [m²].
 
     `shares` as of `fluid_forces`.
     """
-    vectors, parts = _drag(mesh, slip, shares)
-    sectors = mesh.throats.facet_sectors[:, :, None] * mesh.throats.facet_normals[:, None, :]
-    return sectors + parts[:, :, None] * vectors[:, None, :]
+    forces = np.empty((len(mesh.facet_cells), 3, 3))
+    for rows, by_pressure, by_drag in _unit_forces(mesh, slip, shares):
+        np.add(by_pressure, by_drag, out=forces[rows])
+    return forces
 
 
-def _drag(mesh: PoreMesh, slip: np.ndarray, shares: str) -> tuple[np.ndarray, np.ndarray]:
-    """Viscous force (f, 3) for a unit pressure drop, A^f n of the facet's throat, and its vertices' shares (f, 3)."""
+def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Forces (m, 3, 3) on the vertices of facets, for unit drops of pressure, by pressure and by drag, in blocks.
+
+    F^{p,k} = A^k n and F^{v,k} = A^f n γ^k / Σγ, with 'drag' then moved to where they act.
+    """
     if shares not in SHARES:
         raise InputError(f"unknown shares {shares!r}; known: {', '.join(SHARES)}")
     throats = mesh.throats
@@ -168,15 +173,27 @@ def _drag(mesh: PoreMesh, slip: np.ndarray, shares: str) -> tuple[np.ndarray, np
     if shares == "drag":
         volumes = throats.total_by_facet(throats.facet_volumes)
         surfaces = throats.total_by_facet(row_sums(weights))
-        weights = _sheared(weights, volumes, surfaces, mesh.facet_vertices, mesh.n_spheres, mesh.sizes)
+        roundness = throats.roundness(slip)[throats.facet_throat]
+        weights = _sheared(weights, volumes, surfaces, roundness, mesh.facet_vertices, mesh.n_spheres, mesh.sizes)
     sums = throats.total_by_facet(_positive_sum(weights))
+    parts = _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
     vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
-    return vectors, _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
+    for start in range(0, len(parts), BLOCK):
+        rows = slice(start, min(start + BLOCK, len(parts)))
+        by_pressure = throats.facet_sectors[rows, :, None] * throats.facet_normals[rows, None, :]
+        by_drag = parts[rows, :, None] * vectors[rows, None, :]
+        if shares == "drag":
+            add_patches(
+                np.arange(rows.start, rows.stop), mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres,
+                mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks, parts,
+                by_pressure, by_drag,
+            )  # fmt: skip
+        yield rows, by_pressure, by_drag
 
 
 @njit(cache=True)
-def _sheared(weights, volumes, surfaces, facet_vertices, n, sizes):
-    """Wetted surfaces times the shear on them, relative to that in a narrow throat: √(1 + (c R_h / r)²), on walls 1.
+def _sheared(weights, volumes, surfaces, roundness, facet_vertices, n, sizes):
+    """Wetted surfaces times the shear on them, relative to that in a narrow throat: √(1 + (c R_h / r)²), on walls λ.
 
     It is in proportion to 1 / R_h in a throat that is narrow for its spheres, to c / r on a sphere with much room.
     """
@@ -189,6 +206,8 @@ def _sheared(weights, volumes, surfaces, facet_vertices, n, sizes):
             k = facet_vertices[f, v]
             if k < n:
                 sheared[f, v] *= np.sqrt(1.0 + (SHEAR * radius / sizes[k]) ** 2)
+            else:
+                sheared[f, v] *= roundness[f]
     return sheared
 
 
@@ -216,16 +235,16 @@ def _shares(weights, sums, facets):
 
 
 @njit(cache=True)
-def _scatter(facet_vertices, normals, sectors, vectors, shares, drops, pressure, viscous):
-    """Add every facet's forces to its vertices: F^{p,k} = A^k (p_i - p_j) n, F^{v,k} = A^f (p_i - p_j) n γ^k / Σγ."""
+def _scatter(facet_vertices, drops, by_pressure, by_drag, pressure, viscous):
+    """Add every facet's forces to its vertices."""
     for f in range(facet_vertices.shape[0]):
         if drops[f] == 0.0:
             continue
         for v in range(3):
             k = facet_vertices[f, v]
             for axis in range(3):
-                pressure[k, axis] += sectors[f, v] * drops[f] * normals[f, axis]
-                viscous[k, axis] += shares[f, v] * drops[f] * vectors[f, axis]
+                pressure[k, axis] += by_pressure[f, v, axis] * drops[f]
+                viscous[k, axis] += by_drag[f, v, axis] * drops[f]
 
 
 def _hydrostatic(mesh, weight):

@@ -33,6 +33,7 @@ class Throats:
 
     def __init__(self, mesh: PoreMesh):
         self.mesh = mesh
+        self._inscribed: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # by walls with slip
 
     # ---- facets: geometry as computed ---------------------------------------------------------------------------
 
@@ -81,6 +82,19 @@ class Throats:
     def facet_sectors(self) -> np.ndarray:
         """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
         return self._sections[3]
+
+    @cached_property
+    def facet_necks(self) -> np.ndarray:
+        """(f,): height over its neck at which the section of each facet's throat is twice as wide [m].
+
+        A^f + Σ θ s² / 2 with θ the angles of spheres; zero where there is no fluid area.
+        """
+        mesh = self.mesh
+        of_spheres = mesh.facet_vertices < mesh.n_spheres
+        radii = mesh.sizes[np.where(of_spheres, mesh.facet_vertices, 0)]
+        angles = self.total_by_facet(2.0 * (self.facet_sectors / radii**2 * of_spheres).sum(axis=1))
+        areas = np.maximum(self.total_by_facet(self.facet_fluid_areas), 0.0)
+        return np.sqrt(np.divide(2.0 * areas, angles, out=np.zeros_like(areas), where=angles > 0.0))
 
     @property
     def facet_covered(self) -> np.ndarray:
@@ -207,19 +221,45 @@ class Throats:
         On walls with slip, (6,) bool, the circle is centred. Zero where there is no such circle. A throat with more
         than three vertices has the least circle of any three of them, however a tie has cut it.
         """
-        mesh = self.mesh
+        return self.inscribed_circles(slip)[0]
 
-        def circles(vertices: np.ndarray) -> np.ndarray:
-            return inscribed_circles(vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, np.asarray(slip))
+    def inscribed_circles(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Radii (t,) as of `inscribed_radii`, and the part (t,) of each circle's area within its throat's facets.
 
-        radii = circles(mesh.facet_vertices[self.first_facets])
+        A wall with slip leaves half of the circle; so does a neck of four spheres to either of two throats that
+        nearly are one. It is taken for at least a twentieth, should the circle lie beyond the throat's facets. Where
+        there is no circle the part is that which walls with slip leave of the throat.
+        """
+        slip = np.asarray(slip, bool)
+        if slip.tobytes() in self._inscribed:
+            return self._inscribed[slip.tobytes()]
+        circles, within = self._circles(self.mesh.facet_vertices, slip)
+        radii = circles[self.first_facets]
+        whole = 1.0 / self.mirror_images(slip)
+        portions = np.where(self._total(circles) > 0.0, np.clip(self._total(within), 0.05 * whole, whole), whole)
         throat, triples = self._triples
         if len(throat):
             least = np.full(len(self), np.inf)
-            found = circles(triples)
+            found, _ = self._circles(triples, slip)
             np.minimum.at(least, throat, np.where(found > 0.0, found, np.inf))
             radii = np.where(np.isfinite(least), least, radii)
-        return radii
+        return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
+
+    def roundness(self, slip: np.ndarray) -> np.ndarray:
+        """(t,): λ, radius of the inscribed circle over that of the circle of the neck's area; 1 without either.
+
+        The inscribed circle's part within the throat's facets stands for that of the neck.
+        """
+        radii, portions = self.inscribed_circles(slip)
+        areas = np.maximum(self.fluid_areas, 0.0)
+        known = (radii > 0.0) & (areas > 0.0)
+        return np.divide(radii, np.sqrt(areas / (np.pi * portions)), out=np.ones(len(self)), where=known)
+
+    def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mesh = self.mesh
+        found = np.empty(len(vertices)), np.empty(len(vertices))
+        inscribed_circles(vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, slip, *found)
+        return found
 
     @cached_property
     def _triples(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Friction in the cross-sections of a throat, one after another from pore to pore.
 
 The centres of a throat's spheres lie in its facet's plane. At a height s over it the spheres are discs of radius
-√(r² - s²), whose arcs are wetted by the fluid, and leave it the area A(s) = A^f + Σ θ min(s, r)² / 2 of the prism over
+√(r² - s²), whose arcs are wetted by the fluid, and leave it the area A^f + Σ θ min(s, r)² / 2 of the prism over
 the facet. So the section opens as those of a hyperboloid do, whatever the sizes of spheres.
 """
 
@@ -10,15 +10,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from porefv.boundary import LEAST, MOST, within_range
 from porefv.errors import InputError
 from porefv.facets import _at, _cross, _dot, _height, _minus, _towards
+from porefv.kernels import njit, prange
 from porefv.throats import Throats
 
 # A hyperboloid as wide at its neck as it is long, which four spheres make, loses pressure over √2 times that length.
 STRETCH = np.sqrt(0.5)
+# The part of its growth that a section loses to other throats, on the way to the pore's vertex where they all meet.
+NARROWING = 2.0 / 3.0
+# A pore whose vertex lies at a neck or beyond it has this part of the throat's length on its side of the neck yet: what
+# leaves the pores of a cubic lattice alone when a vanishing sphere in them draws the vertices into the necks.
+REACH = 0.1
 # Beyond its poles a sphere still slows the fluid down: at s > r as a disc of this part of its radius times (r / s)².
 LEAST_DISC = 0.3
 # Four points in either half of a throat integrate its friction within some 0.3 %.
@@ -35,9 +40,9 @@ class SectionFriction:
     by q / (A w), which on all of the perimeter makes the first part. The second, for round bodies, is greater the
     further they are apart, and alone is left where there is much more room than grains: a drag in proportion to r.
 
-    w = λ max(√(A/π), 2 A / P): λ, the radius of the circle inscribed in the neck over that of the circle of the
-    neck's area, keeps the flow out of cusps. P counts no-slip walls; of a throat on a wall of symmetry the whole, with
-    its mirror images, is considered.
+    w = λ^{3/2} max(√(A / (π χ)), 2 A / P). λ, the radius of the circle inscribed in the neck over that of the circle of
+    the neck's area, keeps the flow out of cusps; χ is the part of the inscribed circle that lies within the throat, the
+    rest being that of mirror images or of a neighbour that shares its neck. P counts no-slip walls.
 
     Parameters
     ----------
@@ -45,8 +50,8 @@ class SectionFriction:
         c₁, c₂: fitted to permeabilities by resolved Stokes flow (docs/accuracy.md).
     """
 
-    friction: float = 2.2
-    curvature: float = 1.8
+    friction: float = 1.35
+    curvature: float = 1.74
     name = "section-friction"
     shares = "drag"
 
@@ -63,7 +68,7 @@ class SectionFriction:
         _section_friction(
             throats.first_facets, further, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
             mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.lengths,
-            throats.fluid_areas, throats.mirror_images(slip), throats.inscribed_radii(slip), np.asarray(slip, bool),
+            throats.fluid_areas, throats.roundness(slip), throats.inscribed_circles(slip)[1], np.asarray(slip, bool),
             self.friction, self.curvature, conductivity,
         )  # fmt: skip
         return conductivity
@@ -80,8 +85,8 @@ def _further_facets(throats: Throats) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _section_friction(
-    first, further, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas, images,
-    inscribed, slip, c1, c2, conductivity,
+    first, further, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas,
+    roundness, portions, slip, c1, c2, conductivity,
 ):  # fmt: skip
     """Length of each throat over the friction of its sections, 0 without a fluid area."""
     for t in prange(first.shape[0]):
@@ -100,29 +105,25 @@ def _section_friction(
             )  # fmt: skip
         turn = angles.sum()
         widest = radii.max()
-        equal = np.sqrt(images[t] * areas[t] / np.pi)
         radius = 0.0
         for v in range(radii.shape[0]):
             if radii[v] > 0.0:
                 radius += angles[v] * np.cbrt(radii[v] / widest)
         radius = widest * (radius / turn) ** 3
-        shape = (
-            areas[t], wall, radii, angles, images[t], inscribed[t] / equal if inscribed[t] > 0.0 else 1.0,
-            radius, c1, c2,
-        )  # fmt: skip
+        shape = areas[t], wall, radii, angles, portions[t], roundness[t] ** 1.5, radius, c1, c2
         neck = np.sqrt(2.0 * areas[t] / turn)
-        low = STRETCH * _dot(
-            _minus(_at(facet_cells[f, 0], vertices), _at(facet_vertices[f, 0], points)), _at(f, normals)
-        )
-        high = low + STRETCH * lengths[t]
-        near, far = min(abs(low), abs(high)), max(abs(low), abs(high))
-        if high - low < 1e-9 * widest:
-            conductivity[t] = 1.0 / _friction(near, shape)
-        elif low < 0.0 and high > 0.0:
-            total = _between(0.0, near, widest, neck, shape) + _between(0.0, far, widest, neck, shape)
-            conductivity[t] = (high - low) / total
+        low = _dot(_minus(_at(facet_cells[f, 0], vertices), _at(facet_vertices[f, 0], points)), _at(f, normals))
+        high = low + lengths[t]
+        begin = STRETCH * min(low, max(low, 0.0) - REACH * lengths[t])
+        end = STRETCH * max(high, min(high, 0.0) + REACH * lengths[t])
+        if end - begin < 1e-9 * widest:
+            conductivity[t] = STRETCH * lengths[t] / ((end - begin) * _friction(abs(end), abs(end), shape))
+        elif begin < 0.0 and end > 0.0:
+            total = _between(0.0, -begin, widest, neck, shape) + _between(0.0, end, widest, neck, shape)
+            conductivity[t] = STRETCH * lengths[t] / total
         else:
-            conductivity[t] = (high - low) / _between(near, far, widest, neck, shape)
+            near, far = min(abs(begin), abs(end)), max(abs(begin), abs(end))
+            conductivity[t] = STRETCH * lengths[t] / _between(near, far, widest, neck, shape)
 
 
 @njit(cache=True)
@@ -153,17 +154,19 @@ def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
 
 
 @njit(cache=True)
-def _friction(s, shape):
-    """Resistance of a unit of length at height s over the neck."""
-    area, perimeter, radii, angles, images, roundness, radius, c1, c2 = shape
+def _friction(s, reach, shape):
+    """Resistance of a unit of length at height s over the neck, on the way to a pore's vertex at height `reach`."""
+    neck, perimeter, radii, angles, portion, roundness, radius, c1, c2 = shape
+    growth = 0.0
     for v in range(radii.shape[0]):
         r = radii[v]
         least = LEAST_DISC * r
         if s > r:
             least *= (r / s) ** 2
-        area += 0.5 * angles[v] * min(s, r) ** 2
+        growth += 0.5 * angles[v] * min(s, r) ** 2
         perimeter += angles[v] * np.sqrt(max((r - s) * (r + s), least**2))
-    opening = roundness * max(np.sqrt(images * area / np.pi), 2.0 * area / perimeter)
+    area = neck + (1.0 - NARROWING * s / reach) * growth if reach > 0.0 else neck
+    opening = roundness * max(np.sqrt(area / (np.pi * portion)), 2.0 * area / perimeter)
     return (c1 * perimeter + 2.0 * c2 * area / radius) / (area * area * opening)
 
 
@@ -180,7 +183,7 @@ def _between(low, high, widest, neck, shape):
         end = np.log(high / widest)
         for i in range(_NODES.shape[0]):
             s = widest * np.exp(begin + (end - begin) * _NODES[i])
-            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, shape)
+            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, shape)
     if low >= widest:
         return total
     e = neck / widest
@@ -193,5 +196,5 @@ def _between(low, high, widest, neck, shape):
         root = np.sqrt(1.0 - v * v)
         t = e * v / root
         rate = 1.5 * widest * (1.0 - t * t) * e / root**3
-        total += (end - begin) * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), shape)
+        total += (end - begin) * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), high, shape)
     return total
