@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from porefv.conductance import HydraulicRadius
 from porefv.flow import Fluid, PoreFlow
 from porefv.mesh import PoreMesh
 from porefv.packing import Box, Packing
@@ -60,9 +61,10 @@ def random_packing():
 
 @pytest.fixture(scope="session")
 def unit_flow():
-    """unit_flow(mesh, walls, model=..., **options): a flow of unit viscosity and density."""
+    """unit_flow(mesh, walls, model=..., **options): unit viscosity and density, the hydraulic radius unless told."""
 
     def unit_flow(mesh, walls, model=None, **options):
+        model = HydraulicRadius() if model is None else model
         return PoreFlow(mesh, walls, Fluid(viscosity=1.0, density=1.0), model, **options)
 
     return unit_flow

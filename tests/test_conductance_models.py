@@ -75,7 +75,7 @@ def test_flow_through_random_packings(reference, values, unit_flow, name, kind):
     flow, paper = (unit_flow(PoreMesh(reference(name)), walls, model) for model in (SectionFriction(), None))
     assert_allclose(flow.permeability, fem["K"], rtol=0.01)
     error, papers = (np.linalg.norm(found.forces.total - exact) / np.linalg.norm(exact) for found in (flow, paper))
-    assert error < 0.05  # 3.9 to 4.8 %
+    assert error < 0.045  # 3.9 to 4.4 %
     assert error < 0.6 * papers  # 6.9 to 13.2 %
 
 
@@ -289,15 +289,29 @@ def test_what_falls_along_a_throat_adds_up_to_what_drops_across_it(mesh_of):
     assert_allclose(by_drag.sum(axis=1), by_surface.sum(axis=1), atol=1e-14)
 
 
+def test_forces_by_the_image_behind_a_wall_of_symmetry_are_those_by_the_wall(reference):
+    packing = reference("n25_s1")
+    images = np.where([True, False, False], 2.0 - packing.centres, packing.centres)
+    both = Packing(np.vstack([packing.centres, images]), np.tile(packing.radii, 2), Box([0, 0, 0], [2, 1, 1]))
+    walls, model = Walls.along("y", slip=True), SectionFriction()
+    one, two = (PoreFlow(each, walls, conductance=model) for each in (packing, both))
+    assert_allclose(two.permeability, one.permeability, rtol=1e-9)
+    assert_allclose(two.forces.total[:25], one.forces.total, atol=1e-9)
+    assert_allclose(two.forces.total[25:], one.forces.total * [-1.0, 1.0, 1.0], atol=1e-9)
+
+
 def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
     # Every facet between three spheres of n25, on triangles of its spheres in 40 000 pieces.
     mesh = mesh_of("n25_s1")
     throats, pressure = mesh.throats, np.zeros((len(mesh.facet_cells), 3, 3))
+    facets, starts = throats.facets_of_throats
+    found = np.zeros((len(facets), 3, 3))
     add_patches(
-        np.arange(len(pressure)), mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes,
-        mesh.local_vertices, throats.facet_normals, throats.facet_necks, np.ones((len(pressure), 3)), pressure,
-        np.zeros_like(pressure),
+        np.arange(len(throats)), starts, facets, mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres,
+        mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks,
+        np.ones((len(pressure), 3)), found, np.zeros_like(found),
     )  # fmt: skip
+    pressure[facets] = found
     interior = np.flatnonzero((mesh.facet_vertices < mesh.n_spheres).all(axis=1) & (throats.facet_necks > 0.0))
     assert len(interior) > 70
     expected = np.array([patches(mesh, f) for f in interior])

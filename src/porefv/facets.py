@@ -455,22 +455,18 @@ def row_sums(values):
 
 
 @njit(cache=True, parallel=True)
-def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, portions):
-    """Radius of the circle in each facet's plane tangent to its spheres and no-slip walls, centred on walls with slip.
+def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, centres):
+    """Radius and centre of the circle in each facet's plane tangent to its spheres and no-slip walls.
 
-    With the first centre as origin and x = X₀ + ρ X₁ the centre of the circle, its tangency to the other two is
-    linear in ρ and to the first quadratic. Zero where no such circle exists. `portions` are the parts of the circles'
-    areas within the facets: exact where a circle is cut by one edge or two at a right angle.
+    On walls with slip it is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that of the circle, its
+    tangency to the other two is linear in ρ and to the first quadratic. Radius zero where no such circle exists.
     """
     for f in prange(facet_vertices.shape[0]):
         a = facet_vertices[f, 0]
         rows = np.empty((2, 2))
         constant = np.empty(2)
         slope = np.empty(2)
-        u = _towards(a, facet_vertices[f, 1], n, points)
-        normal = _cross(u, _towards(a, facet_vertices[f, 2], n, points))
-        e1 = _unit(u)
-        e2 = _unit(_cross(normal, u))
+        e1, e2 = _axes(f, facet_vertices, n, points)
         for i in range(2):
             m = facet_vertices[f, i + 1]
             w = _towards(a, m, n, points)
@@ -482,8 +478,8 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, portions):
             else:
                 constant[i] = _height(a, m, points, sizes)
                 slope[i] = 0.0 if slip[m - n] else -1.0
+        radii[f] = 0.0
         det = rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0]
-        radii[f] = portions[f] = 0.0
         if det == 0.0:
             continue
         x0 = (constant[0] * rows[1, 1] - constant[1] * rows[0, 1]) / det
@@ -501,37 +497,83 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, portions):
             if below > 0.0:
                 rho = qc / below
                 radii[f] = rho
-                portions[f] = _portion(facet_vertices[f], (x0 + rho * x1, y0 + rho * y1), rho, rows, n, points, sizes)
+                for axis in range(3):
+                    centres[f, axis] = points[a, axis] + (x0 + rho * x1) * e1[axis] + (y0 + rho * y1) * e2[axis]
+
+
+@njit(cache=True, parallel=True)
+def circle_portions(facet_vertices, n, points, sizes, radii, centres, portions):
+    """Part of the area of a circle in each facet's plane that lies within the facet; 0 for a radius of zero."""
+    for f in prange(facet_vertices.shape[0]):
+        portions[f] = 0.0
+        if radii[f] <= 0.0:
+            continue
+        a = facet_vertices[f, 0]
+        b = facet_vertices[f, 1]
+        c = facet_vertices[f, 2]
+        e1, e2 = _axes(f, facet_vertices, n, points)
+        out = _minus(_at(a, points), _at(f, centres))
+        # From the circle's centre to the facet's corners, in radii.
+        corners = np.zeros((4, 2))
+        sides = 3 if c < n else 4
+        for i in range(sides):
+            corner = out
+            if i == 1 or (i == 2 and c >= n):
+                step = 1.0 if b < n else _height(a, b, points, sizes)
+                corner = _plus(corner, _times(step, _towards(a, b, n, points)))
+            if i == 2 and c >= n:
+                corner = _plus(corner, _times(_height(b if b < n else a, c, points, sizes), _at(c, points)))
+            elif i == 2:
+                corner = _plus(corner, _towards(a, c, n, points))
+            elif i == 3:
+                corner = _plus(corner, _times(_height(a, c, points, sizes), _at(c, points)))
+            corners[i, 0] = _dot(corner, e1) / radii[f]
+            corners[i, 1] = _dot(corner, e2) / radii[f]
+        area = 0.0
+        for i in range(sides):
+            area += _within_circle(corners[i], corners[(i + 1) % sides])
+        portions[f] = abs(area) / np.pi
 
 
 @njit(cache=True)
-def _portion(vertices, centre, rho, rows, n, points, sizes):
-    """Part of a circle within a facet; `rows`, (2, 2), lead from its first sphere to its other vertices."""
-    a, b, c = vertices
-    corners = np.zeros((4, 2))
-    if c < n:
-        sides = 3
-        corners[1] = rows[0]
-        corners[2] = rows[1]
-    else:
-        sides = 4
-        corners[1] = rows[0] if b < n else _height(a, b, points, sizes) * rows[0]
-        corners[2] = corners[1] + _height(b if b < n else a, c, points, sizes) * rows[1]
-        corners[3] = _height(a, c, points, sizes) * rows[1]
-    portion = 1.0
-    for i in range(sides):
-        start = corners[i]
-        edge = corners[(i + 1) % sides] - start
-        length = np.sqrt(edge[0] ** 2 + edge[1] ** 2)
-        if length == 0.0:
-            continue
-        # Distance of the edge from the centre, over ρ: beyond it lies a segment of the circle.
-        x = (edge[0] * (centre[1] - start[1]) - edge[1] * (centre[0] - start[0])) / (length * rho)
-        if x <= -1.0:
-            return 0.0
-        if x < 1.0:
-            portion *= 1.0 - (np.arccos(x) - x * np.sqrt((1.0 - x) * (1.0 + x))) / np.pi
-    return portion
+def _axes(f, facet_vertices, n, points):
+    """Two unit vectors in a facet's plane, at right angles in its sense."""
+    a = facet_vertices[f, 0]
+    u = _towards(a, facet_vertices[f, 1], n, points)
+    normal = _cross(u, _towards(a, facet_vertices[f, 2], n, points))
+    return _unit(u), _unit(_cross(normal, u))
+
+
+@njit(cache=True)
+def _within_circle(p, q):
+    """Area that the triangle from the origin to p and q has in common with the unit circle, signed as the triangle."""
+    u = q[0] - p[0]
+    v = q[1] - p[1]
+    square = u * u + v * v
+    along = p[0] * u + p[1] * v
+    across = p[0] * v - p[1] * u
+    discriminant = square - across * across  # without the cancellation of |p|² in a circle far smaller than the facet
+    if square == 0.0 or discriminant <= 0.0:
+        return _sector(p[0], p[1], q[0], q[1])
+    root = np.sqrt(discriminant)
+    enters = (-along - root) / square
+    leaves = (root - along) / square
+    if enters >= 1.0 or leaves <= 0.0:
+        return _sector(p[0], p[1], q[0], q[1])
+    s = max(enters, 0.0)
+    t = min(leaves, 1.0)
+    area = 0.5 * (t - s) * across
+    if enters > 0.0:
+        area += _sector(p[0], p[1], p[0] + s * u, p[1] + s * v)
+    if leaves < 1.0:
+        area += _sector(p[0] + t * u, p[1] + t * v, q[0], q[1])
+    return area
+
+
+@njit(cache=True)
+def _sector(px, py, qx, qy):
+    """Area of the unit circle's sector from the direction of p to that of q, signed."""
+    return 0.5 * np.arctan2(px * qy - py * qx, px * qx + py * qy)
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from porefv.boundary import LEAST, MOST, Walls, within_range
-from porefv.conductance import ConductanceModel, HydraulicRadius
+from porefv.conductance import AUTO, ConductanceModel
 from porefv.errors import ComputationError, InputError
 from porefv.forces import Forces, fluid_forces
 from porefv.mesh import PoreMesh
@@ -92,7 +92,8 @@ class PoreFlow:
     walls : Walls
         Condition on each wall; at least one must hold a pressure.
     fluid : Fluid
-    conductance : ConductanceModel
+    conductance : ConductanceModel, optional
+        `porefv.conductance.AUTO`, section friction, unless given; `HydraulicRadius()` is the paper's.
     gravity : (3,) sequence of float
         Acceleration of gravity, for buoyancy [m/s²].
     solver, tolerance
@@ -118,7 +119,7 @@ class PoreFlow:
         self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()
-        self.conductance = conductance if conductance is not None else HydraulicRadius()
+        self.conductance = conductance if conductance is not None else AUTO()
         self.gravity = np.asarray(gravity, float)
         self.solver = solver
         self.tolerance = tolerance

@@ -15,10 +15,10 @@ from porefv.packing import WALLS
 from porefv.patches import add_patches
 
 SHARES = ("surface", "drag")
-# Facets whose forces are at hand at a time.
+# Throats whose forces are at hand at a time.
 BLOCK = 1 << 16
-# Shear on a sphere in an unbounded stream of speed u, over u / r (Stokes).
-SHEAR = 1.5
+# Shear on a sphere with much room, over u / r with u the throat's mean speed: fitted. In an unbounded stream 1.5.
+SHEAR = 1.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +155,16 @@ def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> n
 
     `shares` as of `fluid_forces`.
     """
-    forces = np.empty((len(mesh.facet_cells), 3, 3))
+    forces = np.zeros((len(mesh.facet_cells), 3, 3))
     for rows, by_pressure, by_drag in _unit_forces(mesh, slip, shares):
-        np.add(by_pressure, by_drag, out=forces[rows])
+        forces[rows] = by_pressure + by_drag
     return forces
 
 
-def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Forces (m, 3, 3) on the vertices of facets, for unit drops of pressure, by pressure and by drag, in blocks.
+def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Facets (m,) of throats, and forces (m, 3, 3) on their vertices for unit drops, by pressure and drag, in blocks.
 
+    Facets of no throat, inside of a pore, know no drop.
     F^{p,k} = A^k n and F^{v,k} = A^f n γ^k / Σγ, with 'drag' then moved to where they act.
     """
     if shares not in SHARES:
@@ -173,19 +174,21 @@ def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tupl
     if shares == "drag":
         volumes = throats.total_by_facet(throats.facet_volumes)
         surfaces = throats.total_by_facet(row_sums(weights))
-        roundness = throats.roundness(slip)[throats.facet_throat]
+        roundness = np.append(throats.roundness(slip), 1.0)[throats.facet_throat]  # the last: facets within a pore
         weights = _sheared(weights, volumes, surfaces, roundness, mesh.facet_vertices, mesh.n_spheres, mesh.sizes)
     sums = throats.total_by_facet(_positive_sum(weights))
     parts = _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
     vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
-    for start in range(0, len(parts), BLOCK):
-        rows = slice(start, min(start + BLOCK, len(parts)))
+    facets, starts = throats.facets_of_throats
+    for first in range(0, len(throats), BLOCK):
+        block = np.arange(first, min(first + BLOCK, len(throats)))
+        rows = facets[starts[block[0]] : starts[block[-1] + 1]]
         by_pressure = throats.facet_sectors[rows, :, None] * throats.facet_normals[rows, None, :]
         by_drag = parts[rows, :, None] * vectors[rows, None, :]
         if shares == "drag":
             add_patches(
-                np.arange(rows.start, rows.stop), mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres,
-                mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks, parts,
+                block, starts, facets, mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres, mesh.local_points,
+                mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks, parts,
                 by_pressure, by_drag,
             )  # fmt: skip
         yield rows, by_pressure, by_drag

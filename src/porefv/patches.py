@@ -27,71 +27,151 @@ _ACROSS, _SHARES = 0.5 * (_ACROSS + 1.0), 0.5 * _SHARES
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def add_patches(
-    facets, facet_cells, facet_vertices, n, points, sizes, vertices, normals, necks, shares, pressure, drag
+    throats, starts, facets, facet_cells, facet_vertices, n, points, sizes, vertices, normals, necks, shares,
+    pressure, drag,
 ):  # fmt: skip
-    """Move, for a unit drop across each of `facets`, what patches take of it from drag to pressure.
+    """Move, for a unit drop across each throat, what patches take of it from drag to pressure.
 
     Parameters
     ----------
+    throats : (t,) array
+        Throats to treat; throat t has the facets starts[t] to starts[t + 1] of `facets`.
     necks : (f,) array
         e, the height at which the section of each facet's throat is twice its neck's; not positive: left out [m].
     shares : (f, 3) array
-        Of drag, among the vertices of each facet.
+        Of drag, among the vertices of all facets of a throat.
     pressure, drag : (m, 3, 3) arrays
-        Forces on the vertices of each of `facets`, added to in place [m²]. Their sum stays as it is.
+        Forces on the vertices of the facets of `throats`, one after another, added to in place [m²]. Their sum stays.
     """
-    for i in prange(facets.shape[0]):
-        f = facets[i]
+    for i in prange(throats.shape[0]):
+        start = starts[throats[i]]
+        stop = starts[throats[i] + 1]
+        row = start - starts[throats[0]]
+        f = facets[start]
         if not necks[f] > 0.0:
             continue
         scale = STRETCH / necks[f]
-        first = _at(facet_vertices[f, 0], points)
         normal = _at(f, normals)
+        first = _at(facet_vertices[f, 0], points)
         # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
         low = min(_fall(scale * _dot(_minus(_at(facet_cells[f, 0], vertices), first), normal)), 0.0)
         high = max(_fall(scale * _dot(_minus(_at(facet_cells[f, 1], vertices), first), normal)), 0.0)
         if not high - low > 0.0:
             continue
         moved = np.zeros(3)
-        for side in range(2):
-            drop = (high if side == 1 else -low) / (high - low)
-            if drop == 0.0:
-                continue
+        for j in range(start, stop):
             for v in range(3):
-                k = facet_vertices[f, v]
-                if k < n:
-                    patch = _patch(f, v, facet_cells[f, side], drop, scale, facet_vertices, n, points, sizes, vertices,
-                                   normal)  # fmt: skip
-                    for axis in range(3):
-                        pressure[i, v, axis] += patch[axis]
-                        moved[axis] += patch[axis]
-        whole = shares[f, 0] + shares[f, 1] + shares[f, 2]
-        for v in range(3):
-            share = shares[f, v] / whole if whole > 0.0 else 1.0 / 3.0
-            for axis in range(3):
-                drag[i, v, axis] -= share * moved[axis]
+                k = facet_vertices[facets[j], v]
+                a, b = _neighbours(k, facets[start:stop], j - start, facet_vertices, normals)
+                if k >= n or a < 0:
+                    continue
+                for side in range(2):
+                    end = high if side == 1 else low
+                    drop = abs(end) / (high - low)
+                    if drop > 0.0:
+                        patch = _patch(
+                            k, a, b, facet_cells[f, side], drop, end, scale, n, points, sizes, vertices, normal
+                        )
+                        sense = 1.0 if _dot(normal, _at(facets[j], normals)) > 0.0 else -1.0
+                        for axis in range(3):
+                            pressure[row + j - start, v, axis] += sense * patch[axis]
+                            moved[axis] += patch[axis]
+        for axis in range(3):
+            on_wall = _wall_across(axis, facets[start:stop], facet_vertices, n, points)
+            for j in range(start, stop):
+                sense = 1.0 if _dot(normal, _at(facets[j], normals)) > 0.0 else -1.0
+                for v in range(3):
+                    if on_wall == 0:
+                        drag[row + j - start, v, axis] -= sense * shares[facets[j], v] * moved[axis]
+                    elif facet_vertices[facets[j], v] >= n and points[facet_vertices[facets[j], v], axis] != 0.0:
+                        pressure[row + j - start, v, axis] -= sense * moved[axis] / on_wall
 
 
 @njit(cache=True)
+def _wall_across(axis, facets, facet_vertices, n, points):
+    """How many of a throat's facets stand on a wall across an axis.
+
+    Its pressure falls along the throat, too, and takes up what spheres bear along the axis: with the throat's image
+    behind the wall they would bear nothing.
+    """
+    count = 0
+    for j in range(facets.shape[0]):
+        for v in range(3):
+            k = facet_vertices[facets[j], v]
+            if k >= n and points[k, axis] != 0.0:
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _neighbours(k, facets, which, facet_vertices, normals):
+    """The vertices before and after k around a throat, in the sense of its first facet; -1, -1 but for k's first facet.
+
+    Where a tie has cut the throat in several facets, those that k has in common with one facet alone.
+    """
+    after = before = -1
+    for j in range(facets.shape[0]):
+        v = _place(k, facets[j], facet_vertices)
+        if v < 0:
+            continue
+        if j < which:
+            return -1, -1
+        following, leading = _around(v, facets[j], facets[0], facet_vertices, normals)
+        inner_a = inner_b = False
+        for m in range(facets.shape[0]):
+            u = _place(k, facets[m], facet_vertices)
+            if m != j and u >= 0:
+                other_a, other_b = _around(u, facets[m], facets[0], facet_vertices, normals)
+                inner_a |= other_b == following
+                inner_b |= other_a == leading
+        if not inner_a:
+            after = following
+        if not inner_b:
+            before = leading
+    return (after, before) if after >= 0 and before >= 0 else (-1, -1)
+
+
+@njit(cache=True)
+def _place(k, f, facet_vertices):
+    for v in range(3):
+        if facet_vertices[f, v] == k:
+            return v
+    return -1
+
+
+@njit(cache=True)
+def _around(v, f, first, facet_vertices, normals):
+    """The other two vertices of facet f, after and before its vertex v in the sense of facet `first`."""
+    following = facet_vertices[f, (v + 1) % 3]
+    leading = facet_vertices[f, (v + 2) % 3]
+    if _dot(_at(f, normals), _at(first, normals)) > 0.0:
+        return following, leading
+    return leading, following
+
+
+@njit(cache=True, error_model="numpy")
 def _fall(x):
     """Φ: friction from the neck to a height over it."""
     t = x / np.sqrt(1.0 + x * x)
     return t - t * t * t / 3.0
 
 
-@njit(cache=True)
-def _patch(f, v, cell, drop, scale, facet_vertices, n, points, sizes, vertices, normal):
-    """Force on a sphere's patch by the pressure's fall between a pore's vertex and the neck, `drop` in all."""
-    k = facet_vertices[f, v]
-    a = _unit(_towards(k, facet_vertices[f, (v + 1) % 3], n, points))
-    b = _unit(_towards(k, facet_vertices[f, (v + 2) % 3], n, points))
+@njit(cache=True, error_model="numpy")
+def _patch(k, after, before, cell, drop, end, scale, n, points, sizes, vertices, normal):
+    """Force on the patch of sphere k by the pressure's fall between a pore's vertex and the neck, `drop` in all.
+
+    `end` is Φ at the vertex. None on a patch so wide that points on the flat triangle are next to the sphere's centre,
+    and would see more of it than a half: a facet's corner of nearly 180°, with the vertex opposite in its plane.
+    """
+    a = _unit(_towards(k, after, n, points))
+    b = _unit(_towards(k, before, n, points))
     to_vertex = _minus(_at(cell, vertices), _at(k, points))
     c = _unit(to_vertex)
     square = sizes[k] * sizes[k]
     steep = _dot(c, normal)
     # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
     volume = _dot(_cross(a, b), c)
-    end = _fall(scale * _dot(to_vertex, normal))
+    seen = 0.0
     x = 0.0
     y = 0.0
     z = 0.0
@@ -104,11 +184,15 @@ def _patch(f, v, cell, drop, scale, facet_vertices, n, points, sizes, vertices, 
             w = wa * a[1] + wb * b[1] + wc * c[1]
             q = wa * a[2] + wb * b[2] + wc * c[2]
             inverse = 1.0 / np.sqrt(u * u + w * w + q * q)
-            left = max(1.0 - _fall(scale * sizes[k] * wc * steep * inverse) / end, 0.0)
+            left = min(max(1.0 - _fall(scale * sizes[k] * wc * steep * inverse) / end, 0.0), 1.0)
             # dA of a point of the flat triangle abc, seen from the centre: volume / distance³.
-            weight = left * _WEIGHTS[i] * _SHARES[j] * (1.0 - wc) * volume * inverse**4
+            solid = _WEIGHTS[i] * _SHARES[j] * (1.0 - wc) * volume * inverse**3
+            seen += abs(solid)
+            weight = left * solid * inverse
             x += weight * u
             y += weight * w
             z += weight * q
+    if not seen <= 2.0 * np.pi:
+        return 0.0, 0.0, 0.0
     factor = -drop * square
     return factor * x, factor * y, factor * z

@@ -262,7 +262,7 @@ def _flow(table: Table) -> FlowOptions:
 
 def read_conductance(table: Table) -> ConductanceModel:
     """The keys `conductance` and `alpha`."""
-    model = table.string("conductance", "hydraulic-radius", choices=MODELS)
+    model = table.string("conductance", "auto", choices=("auto", *MODELS))
     try:
         return conductance_model(model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {}))
     except InputError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.facets import facet_sections, facet_volumes, inscribed_circles, row_sums, tied_facets
+from porefv.facets import circle_portions, facet_sections, facet_volumes, inscribed_circles, row_sums, tied_facets
 
 if TYPE_CHECKING:
     from porefv.mesh import PoreMesh
@@ -144,6 +144,15 @@ class Throats:
         throat[further] = throat[first]
         return throat
 
+    @cached_property
+    def facets_of_throats(self) -> tuple[np.ndarray, np.ndarray]:
+        """Facets in the order of their throats, each's first one first, and where those of each start (t + 1,)."""
+        further, first, _ = self._further
+        facets = np.concatenate([self.first_facets, further])
+        throat = np.concatenate([np.arange(len(self)), self.facet_throat[first]])
+        order = np.argsort(throat, kind="stable")
+        return facets[order], np.searchsorted(throat[order], np.arange(len(self) + 1))
+
     def _total(self, values: np.ndarray) -> np.ndarray:
         """(t,): sum of facet values (f,) over each throat."""
         totals = values[self.first_facets]
@@ -228,21 +237,27 @@ class Throats:
 
         A wall with slip leaves half of the circle; so does a neck of four spheres to either of two throats that
         nearly are one. It is taken for at least a twentieth, should the circle lie beyond the throat's facets. Where
-        there is no circle the part is that which walls with slip leave of the throat.
+        there is no circle the part is what walls with slip leave of the throat.
         """
         slip = np.asarray(slip, bool)
         if slip.tobytes() in self._inscribed:
             return self._inscribed[slip.tobytes()]
-        circles, within = self._circles(self.mesh.facet_vertices, slip)
-        radii = circles[self.first_facets]
-        whole = 1.0 / self.mirror_images(slip)
-        portions = np.where(self._total(circles) > 0.0, np.clip(self._total(within), 0.05 * whole, whole), whole)
+        mesh = self.mesh
+        radii, centres = self._circles(mesh.facet_vertices[self.first_facets], slip)
         throat, triples = self._triples
         if len(throat):
-            least = np.full(len(self), np.inf)
-            found, _ = self._circles(triples, slip)
-            np.minimum.at(least, throat, np.where(found > 0.0, found, np.inf))
-            radii = np.where(np.isfinite(least), least, radii)
+            found, places = self._circles(triples, slip)
+            order = np.lexsort((np.where(found > 0.0, found, np.inf), throat))
+            tied, first = np.unique(throat[order], return_index=True)
+            radii[tied], centres[tied] = found[order][first], places[order][first]
+        portions = np.zeros(len(mesh.facet_vertices))
+        of_throat = self.facet_throat  # -1, the row appended below, within a pore
+        circle_portions(
+            mesh.facet_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes,
+            np.append(radii, 0.0)[of_throat], np.append(centres, np.zeros((1, 3)), axis=0)[of_throat], portions,
+        )  # fmt: skip
+        whole = 1.0 / self.mirror_images(slip)
+        portions = np.where(radii > 0.0, np.clip(self._total(portions), 0.05 * whole, whole), whole)
         return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
 
     def roundness(self, slip: np.ndarray) -> np.ndarray:
@@ -257,7 +272,7 @@ class Throats:
 
     def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mesh = self.mesh
-        found = np.empty(len(vertices)), np.empty(len(vertices))
+        found = np.empty(len(vertices)), np.zeros((len(vertices), 3))
         inscribed_circles(vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, slip, *found)
         return found
 

@@ -88,19 +88,24 @@ def _hydraulic_radius(alpha, areas, volumes, surfaces):
 
 
 MODELS = {model.name: model for model in (HydraulicRadius, EffectiveRadius, SectionFriction)}
+# Closest to resolved flow in every case there is (docs/accuracy.md).
+AUTO = SectionFriction
 
 
 def conductance_model(name: str, **parameters: float) -> ConductanceModel:
-    """The model of that name, `hydraulic-radius`, `effective-radius` or `section-friction`.
+    """The model of that name: `hydraulic-radius`, `effective-radius` or `section-friction`, which is `auto`.
 
     Raises
     ------
     InputError
         For an unknown name or parameter.
     """
-    if name not in MODELS:
-        raise InputError(f"unknown conductance {name!r}; known: {', '.join(MODELS)}")
-    try:
-        return MODELS[name](**parameters)
-    except TypeError:
-        raise InputError(f"conductance {name!r} takes no parameter {', '.join(parameters)}") from None
+    if name != "auto" and name not in MODELS:
+        raise InputError(f"unknown conductance {name!r}; known: auto, {', '.join(MODELS)}")
+    model = AUTO if name == "auto" else MODELS[name]
+    unknown = [parameter for parameter in parameters if parameter not in model.__dataclass_fields__]
+    if unknown:
+        with_it = [other for other in MODELS if set(unknown) <= set(MODELS[other].__dataclass_fields__)]
+        hint = f"; {' and '.join(with_it)} does" if with_it else ""
+        raise InputError(f"conductance {name!r} takes no parameter {', '.join(unknown)}{hint}")
+    return model(**parameters)

@@ -64,9 +64,9 @@ class SectionFriction:
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         mesh = throats.mesh
         conductivity = np.empty(len(throats))
-        further, starts = _further_facets(throats)
+        facets, starts = throats.facets_of_throats
         _section_friction(
-            throats.first_facets, further, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
+            facets, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
             mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.lengths,
             throats.fluid_areas, throats.roundness(slip), throats.inscribed_circles(slip)[1], np.asarray(slip, bool),
             self.friction, self.curvature, conductivity,
@@ -74,33 +74,24 @@ class SectionFriction:
         return conductivity
 
 
-def _further_facets(throats: Throats) -> tuple[np.ndarray, np.ndarray]:
-    """Facets besides the first of throats that a tie has cut, by throat, and where those of each throat start."""
-    further = throats.facet_throat >= 0
-    further[throats.first_facets] = False
-    facets = np.flatnonzero(further)
-    facets = facets[np.argsort(throats.facet_throat[facets], kind="stable")]
-    return facets, np.searchsorted(throats.facet_throat[facets], np.arange(len(throats) + 1))
-
-
 @njit(cache=True, parallel=True, error_model="numpy")
 def _section_friction(
-    first, further, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas,
+    facets, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas,
     roundness, portions, slip, c1, c2, conductivity,
 ):  # fmt: skip
     """Length of each throat over the friction of its sections, 0 without a fluid area."""
-    for t in prange(first.shape[0]):
+    for t in prange(areas.shape[0]):
         conductivity[t] = 0.0
         if areas[t] <= 0.0:
             continue
-        f = first[t]
-        count = 1 + starts[t + 1] - starts[t]
+        f = facets[starts[t]]
+        count = starts[t + 1] - starts[t]
         radii = np.zeros(3 * count)
         angles = np.zeros(3 * count)
-        wall = _discs(f, facet_vertices, n, points, sizes, slip, radii[:3], angles[:3])
-        for i in range(1, count):
+        wall = 0.0
+        for i in range(count):
             wall += _discs(
-                further[starts[t] + i - 1], facet_vertices, n, points, sizes, slip,
+                facets[starts[t] + i], facet_vertices, n, points, sizes, slip,
                 radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3],
             )  # fmt: skip
         turn = angles.sum()
@@ -117,7 +108,7 @@ def _section_friction(
         begin = STRETCH * min(low, max(low, 0.0) - REACH * lengths[t])
         end = STRETCH * max(high, min(high, 0.0) + REACH * lengths[t])
         if end - begin < 1e-9 * widest:
-            conductivity[t] = STRETCH * lengths[t] / ((end - begin) * _friction(abs(end), abs(end), shape))
+            conductivity[t] = 1.0 / _friction(abs(end), abs(end), shape)
         elif begin < 0.0 and end > 0.0:
             total = _between(0.0, -begin, widest, neck, shape) + _between(0.0, end, widest, neck, shape)
             conductivity[t] = STRETCH * lengths[t] / total
@@ -153,7 +144,7 @@ def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
     return 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _friction(s, reach, shape):
     """Resistance of a unit of length at height s over the neck, on the way to a pore's vertex at height `reach`."""
     neck, perimeter, radii, angles, portion, roundness, radius, c1, c2 = shape
@@ -170,13 +161,15 @@ def _friction(s, reach, shape):
     return (c1 * perimeter + 2.0 * c2 * area / radius) / (area * area * opening)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _between(low, high, widest, neck, shape):
     """Friction between two heights, 0 <= low < high.
 
     From the neck to the poles of the widest sphere in t, s = r t (3 - t²) / 2, where the perimeter has no root, and
     points are as dense as the neck, of the length given, asks for. Beyond in the logarithm of s.
     """
+    if abs(high - widest) < 1e-9 * widest:  # lattices: t has a root there, which makes much of rounding
+        high = widest
     total = 0.0
     if high > widest:
         begin = np.log(max(low / widest, 1.0))
@@ -189,12 +182,15 @@ def _between(low, high, widest, neck, shape):
     e = neck / widest
     begin = 2.0 * np.sin(np.arcsin(low / widest) / 3.0)
     end = 2.0 * np.sin(np.arcsin(min(high / widest, 1.0)) / 3.0)
-    begin /= np.sqrt(begin * begin + e * e)
-    end /= np.sqrt(end * end + e * e)
+    # v = t / √(t² + e²), its differences and 1 - v without cancellation: far from a narrow neck v is nearly 1.
+    at_begin, at_end = np.hypot(begin, e), np.hypot(end, e)
+    first, last = begin / at_begin, end / at_end
+    span = (end - begin) * (end + begin) * (e / at_begin / at_end) ** 2 / (first + last)
+    left = e / at_begin * (e / (at_begin + begin))
     for i in range(_NODES.shape[0]):
-        v = begin + (end - begin) * _NODES[i]
-        root = np.sqrt(1.0 - v * v)
+        v = first + span * _NODES[i]
+        root = np.sqrt((left - span * _NODES[i]) * (1.0 + v))
         t = e * v / root
         rate = 1.5 * widest * (1.0 - t * t) * e / root**3
-        total += (end - begin) * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), high, shape)
+        total += span * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), high, shape)
     return total

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from porefv.boundary import Walls
-from porefv.conductance import ConductanceModel, HydraulicRadius
+from porefv.conductance import AUTO, ConductanceModel
 from porefv.coupling.ends import corrected
 from porefv.coupling.exchange import EXCHANGES, Exchange
 from porefv.coupling.fluid import PoreFluid, Power
@@ -70,6 +70,7 @@ class Coupling:
         What each wall is to the fluid: drained at a (piezometric) pressure, or impervious.
     fluid : Fluid, optional
     conductance : ConductanceModel, optional
+        As of `PoreFlow`.
     scheme : {'auto', 'implicit-drag', 'semi-implicit'}
         `semi-implicit` (C14): pressures from the velocities before the step, forces explicit in it; stable where the
         drag number is below 2. `implicit-drag`: pressures from the velocities after the step; stable at any viscosity.
@@ -146,7 +147,7 @@ class Coupling:
         self.grains = grains
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()
-        self.conductance = conductance if conductance is not None else HydraulicRadius()
+        self.conductance = conductance if conductance is not None else AUTO()
         self.effort = Effort()
         self._set_out(start if start is not None else Packing(grains.positions, grains.radii, grains.box))
 
