@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from porefv.conductance import EffectiveRadius, HydraulicRadius
+from porefv.conductance import AUTO, EffectiveRadius
 from porefv.errors import ComputationError, InputError
 from porefv.scene import Scene
 from porefv.scene_table import line_of
@@ -76,7 +76,7 @@ def test_every_key_is_understood():
 def test_what_a_scene_leaves_out_has_defaults():
     scene = Scene.from_mapping(mapping(), directory=DATA / "packings")
     assert scene.box is None
-    assert scene.flow.conductance == HydraulicRadius(alpha=0.5)
+    assert scene.flow.conductance == AUTO()
     assert scene.flow.solver == "auto"
     assert scene.output.quantities == ("permeability",)
     assert scene.output.vtk is False
@@ -103,8 +103,8 @@ def test_paths_are_relative_to_the_scene_file(tmp_path, monkeypatch):
 
 def test_alpha_scales_the_permeability():
     def permeability(**flow):
-        scene = Scene.from_mapping(mapping(flow=flow), directory=DATA / "packings")
-        return scene.pore_flow().permeability
+        flow["conductance"] = "hydraulic-radius"
+        return Scene.from_mapping(mapping(flow=flow), directory=DATA / "packings").pore_flow().permeability
 
     assert permeability(alpha=1.0) == pytest.approx(2.0 * permeability(), rel=1e-9)
 
@@ -198,7 +198,9 @@ BAD = {
     "no pressure wall": ("pressure", "# pressure", "not TOML"),
     "walls left out": ("[walls]", "[box]", ".box. unknown key 'y_min'"),
     "gravity": ("[flow]", "[flow]\ngravity = [0, 0]", "line 8: .flow. gravity: expected three"),
-    "negative alpha": ("[flow]", "[flow]\nalpha = -1", "alpha must be a positive number"),
+    "negative alpha": (
+        "[flow]", '[flow]\nconductance = "hydraulic-radius"\nalpha = -1', "alpha must be a positive number"
+    ),
     "alpha of another model": (
         "[flow]", '[flow]\nconductance = "effective-radius"\nalpha = 1.0', "line 9: .flow. alpha: .* no param"
     ),

@@ -155,16 +155,15 @@ def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> n
 
     `shares` as of `fluid_forces`.
     """
-    forces = np.zeros((len(mesh.facet_cells), 3, 3))
+    forces = np.empty((len(mesh.facet_cells), 3, 3))
     for rows, by_pressure, by_drag in _unit_forces(mesh, slip, shares):
         forces[rows] = by_pressure + by_drag
     return forces
 
 
 def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Facets (m,) of throats, and forces (m, 3, 3) on their vertices for unit drops, by pressure and drag, in blocks.
+    """Facets (m,), and forces (m, 3, 3) on their vertices for unit drops, by pressure and by drag, in blocks.
 
-    Facets of no throat, inside of a pore, know no drop.
     F^{p,k} = A^k n and F^{v,k} = A^f n γ^k / Σγ, with 'drag' then moved to where they act.
     """
     if shares not in SHARES:
@@ -180,12 +179,13 @@ def _unit_forces(mesh: PoreMesh, slip: np.ndarray, shares: str) -> Iterator[tupl
     parts = _shares(weights, sums, throats.total_by_facet(np.ones(len(sums))))
     vectors = throats.total_vectors(throats.facet_fluid_areas[:, None] * throats.facet_normals)
     facets, starts = throats.facets_of_throats
-    for first in range(0, len(throats), BLOCK):
+    within = np.flatnonzero(throats.facet_throat < 0)  # a united pore
+    for first in [*range(0, len(throats), BLOCK), -1]:
         block = np.arange(first, min(first + BLOCK, len(throats)))
-        rows = facets[starts[block[0]] : starts[block[-1] + 1]]
+        rows = facets[starts[block[0]] : starts[block[-1] + 1]] if first >= 0 else within
         by_pressure = throats.facet_sectors[rows, :, None] * throats.facet_normals[rows, None, :]
         by_drag = parts[rows, :, None] * vectors[rows, None, :]
-        if shares == "drag":
+        if shares == "drag" and first >= 0:
             add_patches(
                 block, starts, facets, mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres, mesh.local_points,
                 mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks, parts,
