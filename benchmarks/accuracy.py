@@ -5,6 +5,7 @@ python benchmarks/accuracy.py throats    # throat by throat, by kind
 python benchmarks/accuracy.py paper      # Chareyre et al. (2012): figures 9 to 12, table 2
 python benchmarks/accuracy.py limits     # cubic lattices; one more grain
 python benchmarks/accuracy.py fit        # the constants of SectionFriction
+python benchmarks/accuracy.py cost       # C12's table 1
 python benchmarks/accuracy.py all --out docs/img    # draws the figures, too
 """
 
@@ -15,6 +16,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -487,7 +489,53 @@ def fit(out: Path | None) -> None:
     print(f"{taken}: rms {rms(errors(np.array([taken.friction, taken.curvature]))):.3f}")
 
 
-PARTS = {"cases": cases, "throats": throats, "forces": forces, "paper": paper, "limits": limits, "fit": fit}
+# ---- cost -------------------------------------------------------------------------------------------------------
+
+
+def cost(out: Path | None) -> None:
+    """Time from packing to forces beside that of the finite elements, as C12's table 1; and of conductances alone."""
+    print(f"{'no-slip':12}{'spheres':>8}{'unknowns':>10}{'elements':>11}" + "".join(
+        f"{model.name:>18}{'k':>8}{'forces':>8}" for model in MODELS[1:]))  # fmt: skip
+    for name in ("sc8", "nine_0.72", "n25_s1", "n54_s1", "n200_s1", "n2000_s1", "n20000_s1"):
+        file = DATA / "reference" / "stokes" / f"{name}_no_slip.json"
+        case = Case(StokesReference.read(file)) if file.exists() else None
+        packing = case.reference.packing if case else stored(name)
+        line = f"{name:12}{len(packing):8}"
+        line += f"{case.reference.runs[-1].unknowns:10}{case.reference.runs[-1].seconds:9.0f} s" if case else " " * 21
+        for model in MODELS[1:]:
+            times = [timed(packing, model) for _ in range(8)]
+            line += f"{1e3 * min(times):15.1f} ms"
+            errors = (case.permeability_error(model), case.force_error(model)) if case else ()
+            line += "".join(f"{100 * error:+7.1f}%" for error in errors) or " " * 16
+        print(line)
+    throats = PoreMesh(packing).throats
+    slip = np.zeros(6, bool)
+    print(f"{len(throats)} throats, conductances:", end=" ")
+    for model in MODELS:
+        throats = PoreMesh(packing).throats
+        _ = throats.facet_sectors
+        before = process_time()
+        model.conductivity(throats, slip)
+        print(f"{model.name} {process_time() - before:.2f} s", end="  ")
+    print()
+
+
+def timed(packing: Packing, model: ConductanceModel) -> float:
+    before = process_time()
+    flow = PoreFlow(PoreMesh(packing), walls_of("no_slip"), Fluid(1.0), model)
+    _ = flow.permeability, flow.forces
+    return process_time() - before
+
+
+PARTS = {
+    "cases": cases,
+    "throats": throats,
+    "forces": forces,
+    "paper": paper,
+    "limits": limits,
+    "fit": fit,
+    "cost": cost,
+}
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ stress at once, and the sample drains through both ends.
 Each run is kept in --store (a file a run), and taken from there the next time. The modulus is that between gauges
 within the sample, the permeability that between taps, as in a laboratory: the grains on the plates are softer bedded
 and drain freely. What the bedding settles, known from the dry test too, is taken off the settlement.
+Conductances are by the hydraulic radius.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ def consolidation(grains: int, stress: float, store: Path, **options) -> dict:
         height = float(dem.box.size[2])
         unit = (0.5 * height) ** 2 / (flow["taps"] * measured["gauged_modulus"] / VISCOSITY)
         dem.set_plates({"z_max": Plate(stress=stress, top_speed=0.5)})
-        coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY), **options)
+        coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY), HydraulicRadius(), **options)
         begin, cpu = time.perf_counter(), time.process_time()
         rows = []
         imbalance = 0.0

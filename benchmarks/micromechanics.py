@@ -2,7 +2,8 @@
 
 The oedometer of benchmarks/consolidation.py, looked at from within: at some time factors, layer by layer, the fluid's
 pressure, the increment of the grains' stress, and their strain since the load came. Beside the strain is that of the
-same layer of the dry sample at the same stress: it is loaded in steps, slowly, from rest to rest.
+same layer of the dry sample at the same stress: it is loaded in steps, slowly, from rest to rest. Conductances are by
+the hydraulic radius.
 
     python benchmarks/micromechanics.py --grains 2000 --out docs/img/micromechanics.png
 """
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, permeability, sample
 
-from porefv import Fluid, PoreMesh
+from porefv import Fluid, HydraulicRadius, PoreMesh
 from porefv.coupling import Coupling
 from porefv.dem import DEM, Plate
 from porefv.poromechanics import grain_strains, grain_stresses, layer_means, terzaghi_pressure
@@ -103,7 +104,7 @@ def main() -> None:
     dem = sample(options.grains, options.store)
     dem.damping = 0.0
     dem.set_plates({"z_max": Plate(stress=options.stress, top_speed=0.5)})
-    coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY))
+    coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY), HydraulicRadius())
     half = 0.5 * (start.edges[-1] - start.edges[0])
     unit = half**2 * VISCOSITY / (permeability(start.mesh.packing)["taps"] * modulus)
     rows = {}

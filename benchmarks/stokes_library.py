@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
+from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
 from porefv.dem import Material
 from porefv.dem.generation import UniformSizes, cloud, grow
 from porefv.reference import Options, stokes_reference
@@ -112,7 +112,7 @@ def compute(name: str, kind: str, out: Path, full: bool) -> None:
     options = Options(mesh_size=0.5) if full else Options(mesh_size=0.6, single=True)
     found = stokes_reference(mesh, walls, 1.0, options, name=f"{name}_{kind}")
     found.write(out / f"{name}_{kind}.json")
-    model = PoreFlow(mesh, walls, Fluid(viscosity=1.0)).permeability
+    model = PoreFlow(mesh, walls, Fluid(viscosity=1.0), HydraulicRadius()).permeability
     last = found.runs[-1]
     print(
         f"{found.name:32} porosity {packing.porosity:.3f}  K {found.permeability:.6g} m²  "

@@ -530,6 +530,16 @@ def circle_portions(facet_vertices, n, points, sizes, radii, centres, portions):
             corners[i, 0] = _dot(corner, e1) / radii[f]
             corners[i, 1] = _dot(corner, e2) / radii[f]
         area = 0.0
+        apart = 0  # edges beyond the circle, all of them to the left
+        for i in range(sides):
+            j = (i + 1) % sides
+            u = corners[j, 0] - corners[i, 0]
+            v = corners[j, 1] - corners[i, 1]
+            if corners[i, 0] * v - corners[i, 1] * u >= np.sqrt(u * u + v * v) > 0.0:
+                apart += 1
+        if apart == sides:
+            portions[f] = 1.0
+            continue
         for i in range(sides):
             area += _within_circle(corners[i], corners[(i + 1) % sides])
         portions[f] = abs(area) / np.pi

@@ -176,19 +176,21 @@ def _patch(k, after, before, cell, drop, end, scale, n, points, sizes, vertices,
     y = 0.0
     z = 0.0
     for i in range(_NODES.shape[0]):
+        wc = _NODES[i]
+        height = scale * sizes[k] * wc * steep  # over e / β, times the point's distance
         for j in range(_ACROSS.shape[0]):
-            wc = _NODES[i]
             wb = (1.0 - wc) * _ACROSS[j]
             wa = 1.0 - wc - wb
             u = wa * a[0] + wb * b[0] + wc * c[0]
             w = wa * a[1] + wb * b[1] + wc * c[1]
             q = wa * a[2] + wb * b[2] + wc * c[2]
-            inverse = 1.0 / np.sqrt(u * u + w * w + q * q)
-            left = min(max(1.0 - _fall(scale * sizes[k] * wc * steep * inverse) / end, 0.0), 1.0)
-            # dA of a point of the flat triangle abc, seen from the centre: volume / distance³.
-            solid = _WEIGHTS[i] * _SHARES[j] * (1.0 - wc) * volume * inverse**3
-            seen += abs(solid)
-            weight = left * solid * inverse
+            far = u * u + w * w + q * q
+            t = height / np.sqrt(far + height * height)
+            left = min(max(1.0 - (t - t * t * t / 3.0) / end, 0.0), 1.0)
+            # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
+            solid = _WEIGHTS[i] * _SHARES[j] * (1.0 - wc) * volume / (far * far)
+            seen += abs(solid) * np.sqrt(far)
+            weight = left * solid
             x += weight * u
             y += weight * w
             z += weight * q

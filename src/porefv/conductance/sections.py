@@ -107,7 +107,7 @@ def _section_friction(
         high = low + lengths[t]
         begin = STRETCH * min(low, max(low, 0.0) - REACH * lengths[t])
         end = STRETCH * max(high, min(high, 0.0) + REACH * lengths[t])
-        if end - begin < 1e-9 * widest:
+        if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
             conductivity[t] = 1.0 / _friction(abs(end), abs(end), shape)
         elif begin < 0.0 and end > 0.0:
             total = _between(0.0, -begin, widest, neck, shape) + _between(0.0, end, widest, neck, shape)
