@@ -62,16 +62,21 @@ def add_patches(
         for j in range(start, stop):
             for v in range(3):
                 k = facet_vertices[facets[j], v]
-                a, b = _neighbours(k, facets[start:stop], j - start, facet_vertices, normals)
-                if k >= n or a < 0:
+                if k >= n:
                     continue
+                after, before = facet_vertices[f, (v + 1) % 3], facet_vertices[f, (v + 2) % 3]
+                if stop - start > 1:
+                    after, before = _neighbours(k, facets[start:stop], j - start, facet_vertices, normals)
+                    if after < 0:
+                        continue
+                a = _unit(_towards(k, after, n, points))
+                b = _unit(_towards(k, before, n, points))
                 for side in range(2):
                     end = high if side == 1 else low
                     drop = abs(end) / (high - low)
                     if drop > 0.0:
-                        patch = _patch(
-                            k, a, b, facet_cells[f, side], drop, end, scale, n, points, sizes, vertices, normal
-                        )
+                        to_vertex = _minus(_at(facet_cells[f, side], vertices), _at(k, points))
+                        patch = _patch(a, b, to_vertex, sizes[k], normal, scale, end, drop)
                         sense = 1.0 if _dot(normal, _at(facets[j], normals)) > 0.0 else -1.0
                         for axis in range(3):
                             pressure[row + j - start, v, axis] += sense * patch[axis]
@@ -157,17 +162,14 @@ def _fall(x):
 
 
 @njit(cache=True, error_model="numpy")
-def _patch(k, after, before, cell, drop, end, scale, n, points, sizes, vertices, normal):
-    """Force on the patch of sphere k by the pressure's fall between a pore's vertex and the neck, `drop` in all.
+def _patch(a, b, to_vertex, radius, normal, scale, end, drop):
+    """Force on a sphere's patch by the pressure's fall between a pore's vertex and the neck, `drop` in all.
 
-    `end` is Φ at the vertex. None on a patch so wide that points on the flat triangle are next to the sphere's centre,
-    and would see more of it than a half: a facet's corner of nearly 180°, with the vertex opposite in its plane.
+    The patch spans from a to b, unit vectors in the neck, and the vertex, where Φ is `end`. There is none where points
+    on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a facet's corner of
+    nearly 180° with the vertex opposite in its plane.
     """
-    a = _unit(_towards(k, after, n, points))
-    b = _unit(_towards(k, before, n, points))
-    to_vertex = _minus(_at(cell, vertices), _at(k, points))
     c = _unit(to_vertex)
-    square = sizes[k] * sizes[k]
     steep = _dot(c, normal)
     # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
     volume = _dot(_cross(a, b), c)
@@ -177,7 +179,7 @@ def _patch(k, after, before, cell, drop, end, scale, n, points, sizes, vertices,
     z = 0.0
     for i in range(_NODES.shape[0]):
         wc = _NODES[i]
-        height = scale * sizes[k] * wc * steep  # over e / β, times the point's distance
+        height = scale * radius * wc * steep  # over e / β, times the point's distance
         for j in range(_ACROSS.shape[0]):
             wb = (1.0 - wc) * _ACROSS[j]
             wa = 1.0 - wc - wb
@@ -196,5 +198,5 @@ def _patch(k, after, before, cell, drop, end, scale, n, points, sizes, vertices,
             z += weight * q
     if not seen <= 2.0 * np.pi:
         return 0.0, 0.0, 0.0
-    factor = -drop * square
+    factor = -drop * radius * radius
     return factor * x, factor * y, factor * z
