@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.boundary import Wall, Walls
-from porefv.conductance import EffectiveRadius, HydraulicRadius
+from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
 from porefv.flow import Fluid, PoreFlow
 from porefv.forces import fluid_forces
 from porefv.mesh import PoreMesh
@@ -13,7 +13,7 @@ from porefv.packing import Box, Packing
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 NAMES = ["sc8", "nine_0.2", "nine_0.72", "n25_s1", "n54_s1", "n200_s1", "n2000_s1"]
-MODELS = [HydraulicRadius(), EffectiveRadius()]
+MODELS = [HydraulicRadius(), EffectiveRadius(), SectionFriction()]
 
 
 def everything(forces):
@@ -24,7 +24,7 @@ def everything(forces):
 # ---- sums ----------
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 @pytest.mark.parametrize("slip", [False, True], ids=["no-slip", "symmetry"])
 @pytest.mark.parametrize("name", NAMES)
 def test_force_sum_equals_pressure_drop_times_section(mesh_of, unit_flow, name, slip, model):

@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.boundary import Walls
-from porefv.conductance import EffectiveRadius, HydraulicRadius
+from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
 from porefv.flow import Fluid, PoreFlow
 from porefv.mesh import PoreMesh
 from porefv.packing import Box, Packing
 
 NAMES = ["n54_s1", "n200_s1"]
-MODELS = [HydraulicRadius(), EffectiveRadius()]
+MODELS = [HydraulicRadius(), EffectiveRadius(), SectionFriction()]
 RTOL = 1e-9  # issue 2: relative, after the units are accounted for
 
 
@@ -39,7 +39,7 @@ def check_same(flow, other, length=1.0, drop=1.0, viscosity=1.0, order=slice(Non
 # ---- where it stands and how large it is ----------
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 @pytest.mark.parametrize("shift", [(1e3, 0, 0), (-1e3, 1e3, 1e3), (0.1, -0.7, 1e3)])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_answer_does_not_depend_on_where_the_box_stands(reference, name, shift, model):
@@ -57,7 +57,7 @@ def test_a_lattice_may_stand_anywhere(lattice, kind, m):
     check_same(flow_through(packing), flow_through(moved))
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 @pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-3, 0.3, 1e3, 1e6])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_answer_does_not_depend_on_the_unit_of_length(reference, name, scale, model):
@@ -163,7 +163,7 @@ def check_turned(packing, model, slip=False):
                 assert_allclose(found, image, rtol=0, atol=RTOL * wall_largest)
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 def test_a_random_packing_may_be_turned_in_48_ways(reference, model):
     packing = reference("n54_s1")
     assert len(SYMMETRIES) == 48
@@ -171,14 +171,14 @@ def test_a_random_packing_may_be_turned_in_48_ways(reference, model):
 
 
 @pytest.mark.parametrize("kind, m", [("sc", 4), ("bcc", 3), ("fcc", 2), ("hcp", 3)])
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 def test_a_lattice_may_be_turned_in_48_ways(lattice, kind, m, model):
     # Ties are broken in the order of the coordinates, which a turn changes: none of it may show. With spacings
     # of 0.1 they are rounded besides.
     check_turned(lattice(kind, m, spacing=0.1), model)
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective"])
+@pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 def test_a_lattice_between_symmetry_walls_may_be_turned_in_48_ways(lattice, model):
     # Here some ties are between three spheres and a wall: a throat that either is at the wall or is not.
     check_turned(lattice("hcp", 3, spacing=0.1), model, slip=True)

@@ -7,7 +7,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from porefv.boundary import Wall, Walls
-from porefv.conductance import EffectiveRadius, HydraulicRadius
+from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
 from porefv.errors import PorefvError
 from porefv.flow import Fluid, PoreFlow
 from porefv.mesh import PoreMesh
@@ -73,7 +73,7 @@ def flows(draw):
     """A flow: nothing is computed yet, or refused."""
     spheres = draw(st.one_of(few(), many()))
     shape = np.array(draw(shapes))
-    scale = 10.0 ** draw(st.integers(-9, 9))
+    scale = 10.0 ** draw(st.one_of(st.integers(-9, 9), st.integers(-30, 30)))
     shift = draw(st.sampled_from([0.0, 0.0, 0.0, 1.0, -1.0, 1e3, 1e6])) * shape
     box = Box(shift * scale, (shift + shape) * scale)
     packing = Packing((spheres[:, :3] * shape + shift) * scale, spheres[:, 3] * shape.min() * scale, box)
@@ -92,7 +92,7 @@ def flows(draw):
         mesh,
         walls,
         Fluid(10.0 ** draw(st.integers(-15, 15)), 1000.0),
-        draw(st.sampled_from([HydraulicRadius(), HydraulicRadius(), EffectiveRadius()])),
+        draw(st.sampled_from([*[SectionFriction()] * 4, HydraulicRadius(), EffectiveRadius()])),
         gravity=(0.0, 0.0, draw(st.sampled_from([0.0, -9.81]))),
         solver=draw(st.sampled_from(["auto", "direct", "cg"])),
     )
@@ -128,7 +128,7 @@ def test_a_flow_is_refused_with_a_reason_or_conserved_bounded_and_finite(data):
     try:
         report = check(data.draw(flows()))
     except PorefvError as error:
-        assert str(error)
+        assert str(error) and "not finite" not in str(error)
         event("refused: " + str(error).split("(")[0][:60])
         return
     event("done, imbalance " + ("below 1e-10" if report.imbalance <= 1e-10 else "at the floor of rounding"))
