@@ -270,11 +270,8 @@ def by_shape(found: list[Case]) -> None:
         conductances = np.stack([case.flow(model).conductances for model in MODELS[1:]], axis=1)
         rows = (case.walls_of_throats == 0) & np.isfinite(case.drops).all(axis=1) & (conductances > 0.0).all(axis=1)
         scale = 1.0 / case.reference.permeability
-        table.append(
-            np.column_stack([lengths, case.drops * flux[:, None] * scale, flux[:, None] ** 2 * scale / conductances])[
-                rows
-            ]
-        )
+        drops, flux = case.drops[rows], flux[rows, None]
+        table.append(np.column_stack([lengths[rows], drops * flux * scale, flux**2 * scale / conductances[rows]]))
     rows = np.concatenate(table)
     print("\ninterior throats, by length over the radius of the neck's area: resolved over computed resistance")
     print(f"{'L / radius':14}{'number':>8}{'hydraulic-radius':>24}{'section-friction':>24}")

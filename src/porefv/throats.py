@@ -263,12 +263,15 @@ class Throats:
     def roundness(self, slip: np.ndarray) -> np.ndarray:
         """(t,): λ, radius of the inscribed circle over that of the circle of the neck's area; 1 without either.
 
-        The inscribed circle's part within the throat's facets stands for that of the neck.
+        The inscribed circle's part within the throat's facets stands for that of the neck. 1 at most: that part is a
+        guess where the circle lies beyond the facets.
         """
         radii, portions = self.inscribed_circles(slip)
         areas = np.maximum(self.fluid_areas, 0.0)
         known = (radii > 0.0) & (areas > 0.0)
-        return np.divide(radii, np.sqrt(areas / (np.pi * portions)), out=np.ones(len(self)), where=known)
+        return np.minimum(
+            np.divide(radii, np.sqrt(areas / (np.pi * portions)), out=np.ones(len(self)), where=known), 1.0
+        )
 
     def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mesh = self.mesh
