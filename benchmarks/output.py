@@ -12,12 +12,12 @@ from pathlib import Path
 
 from scale import mirrored
 
-from porefv import Fluid, PoreFlow, Walls, results
+from porefv import Fluid, HydraulicRadius, PoreFlow, Walls, results
 
 
 def main() -> None:
     spheres = int(sys.argv[1]) if len(sys.argv) > 1 else 160_000
-    flow = PoreFlow(mirrored(spheres), Walls.along("y"), Fluid(1.0))
+    flow = PoreFlow(mirrored(spheres), Walls.along("y"), Fluid(1.0), HydraulicRadius())
     _ = flow.forces, flow.pore_velocity, flow.mesh.pore_volumes
     with tempfile.TemporaryDirectory() as folder:
         for name, asked in (

@@ -24,6 +24,7 @@ import numpy as np
 from yade_flow import run_yade
 
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
+from porefv.conductance import conductance_model
 
 PACKINGS = Path(__file__).resolve().parents[1] / "data" / "packings"
 REPEATS = {2_000: 5, 20_000: 5, 160_000: 2, 1_000_000: 1}
@@ -35,15 +36,17 @@ def main() -> None:
     parser.add_argument("spheres", nargs="*", type=int, default=list(TILES), help=f"of {', '.join(map(str, TILES))}")
     parser.add_argument("--out", type=Path, help="write a log-log plot here")
     parser.add_argument("--yade-limit", type=int, default=160_000, help="largest packing given to Yade; 0: none")
+    parser.add_argument("--conductance", default="hydraulic-radius", help="the default is Yade's model")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(measure(options.spheres[0])))
+        print(json.dumps(measure(options.spheres[0], options.conductance)))
         return
     yade = shutil.which("yade")
     rows = []
     for spheres in options.spheres:
-        ours = {threads: child(spheres, threads) for threads in sorted({1, os.cpu_count() or 1})}
+        counts = sorted({1, os.cpu_count() or 1})
+        ours = {threads: child(spheres, threads, options.conductance) for threads in counts}
         rows.append({"spheres": spheres, "ours": ours})
         if yade and spheres <= options.yade_limit:
             repeats = 1 + REPEATS[spheres] // 3
@@ -65,11 +68,13 @@ def mirrored(spheres: int) -> Packing:
     return Packing(centres, np.tile(packing.radii, len(copies)), Box(np.zeros(3), np.array(tiles, float)))
 
 
-def measure(spheres: int) -> dict:
+def measure(spheres: int, conductance: str) -> dict:
     """Seconds of each stage, and what was computed."""
-    run(mirrored(2_000))  # loads the compiled kernels
+    run(mirrored(2_000), conductance)  # loads the compiled kernels
     before = peak()
-    seconds, flow = min((run(mirrored(spheres)) for _ in range(REPEATS[spheres])), key=lambda run: run[0]["total"])
+    seconds, flow = min(
+        (run(mirrored(spheres), conductance) for _ in range(REPEATS[spheres])), key=lambda run: run[0]["total"]
+    )
     report = flow.solver_report
     return {
         "seconds": seconds,
@@ -83,7 +88,7 @@ def measure(spheres: int) -> dict:
     }
 
 
-def run(packing: Packing) -> tuple[dict[str, float], PoreFlow]:
+def run(packing: Packing, conductance: str) -> tuple[dict[str, float], PoreFlow]:
     """Validation to forces, stage by stage."""
     seconds = {}
     mesh = None
@@ -91,7 +96,7 @@ def run(packing: Packing) -> tuple[dict[str, float], PoreFlow]:
         begin = time.perf_counter()
         if stage == "validation":
             mesh = PoreMesh(packing)
-            flow = PoreFlow(mesh, Walls.along("y"), Fluid(1.0), solver="cg")
+            flow = PoreFlow(mesh, Walls.along("y"), Fluid(1.0), conductance_model(conductance), solver="cg")
         elif stage == "triangulation":
             _ = mesh.triangulation
         elif stage == "pores":
@@ -112,10 +117,10 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 
 
-def child(spheres: int, threads: int) -> dict:
+def child(spheres: int, threads: int, conductance: str) -> dict:
     """`measure` in a process of its own."""
     environment = os.environ | {"NUMBA_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads)}
-    command = [sys.executable, __file__, "--one", str(spheres)]
+    command = [sys.executable, __file__, "--one", str(spheres), "--conductance", conductance]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
     return json.loads(done.stdout)
 
