@@ -8,7 +8,7 @@ from pathlib import Path
 
 from porefv.errors import ComputationError
 
-# Peak resident size of a flow with forces, measured by benchmarks/scale.py --conductance auto: about 6 pores a sphere, 1 kB a pore.
+# Peak resident size of a flow with forces, by benchmarks/scale.py --conductance auto: 6 pores a sphere, 1 kB a pore.
 BYTES_PER_SPHERE = 6_200
 BYTES_PER_CELL = 1_050
 _LOADED = 200 * 2**20  # Python, numpy, scipy, numba and the kernels
