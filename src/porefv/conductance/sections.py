@@ -40,6 +40,9 @@ class SectionFriction:
     by q / (A w), which on all of the perimeter makes the first part. The second, for round bodies, is greater the
     further they are apart, and alone is left where there is much more room than grains: a drag in proportion to r.
 
+    s runs between √½ times the heights of the pores' vertices, a tenth of the length to either side of the neck at
+    least. On its way to a vertex at h the section grows by 1 - 2 s / 3 h of what the prism's does.
+
     w = λ^{3/2} max(√(A / (π χ)), 2 A / P). λ, the radius of the circle inscribed in the neck over that of the circle of
     the neck's area, keeps the flow out of cusps; χ is the part of the inscribed circle that lies within the throat, the
     rest being that of mirror images or of a neighbour that shares its neck. P counts no-slip walls.
