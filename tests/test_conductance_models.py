@@ -81,9 +81,9 @@ def test_flow_through_random_packings(reference, values, unit_flow, name, kind):
 
 @pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "sc8", "bcc9", "nine_0.4"])
 def test_pressure_and_drag_each_have_their_part(name):
-    # Constant pressures in pores leave drag an eighth to a quarter low: what falls along throats pushes spheres less.
+    # Constant pressures in pores leave drag 12 to 15 % low; with pressure that falls along throats it is 5 to 8 % high.
     ref = stokes(name, "no_slip")
-    for model, (least, most) in ((SectionFriction(), (0.98, 1.07)), (HydraulicRadius(), (0.75, 0.9))):
+    for model, (least, most) in ((SectionFriction(), (1.0, 1.08)), (HydraulicRadius(), (0.75, 0.9))):
         forces = PoreFlow(ref.pore_mesh(), ref.walls, conductance=model).forces
         drag = forces.viscous[:, 1].sum() + forces.wall_viscous[:, 1].sum()
         exact = ref.values.sphere_viscous[:, 1].sum() + ref.values.wall_viscous[[0, 1, 4, 5], 1].sum()
