@@ -54,8 +54,8 @@ def add_patches(
         normal = _at(f, normals)
         first = _at(facet_vertices[f, 0], points)
         # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
-        low = min(_fall(scale * _dot(_minus(_at(facet_cells[f, 0], vertices), first), normal)), 0.0)
-        high = max(_fall(scale * _dot(_minus(_at(facet_cells[f, 1], vertices), first), normal)), 0.0)
+        low = min(_fall(scale * _dot(_minus(_at(facet_cells[f, 0], vertices), first), normal), 1.0), 0.0)
+        high = max(_fall(scale * _dot(_minus(_at(facet_cells[f, 1], vertices), first), normal), 1.0), 0.0)
         if not high - low > 0.0:
             continue
         moved = np.zeros(3)
@@ -155,9 +155,9 @@ def _around(v, f, first, facet_vertices, normals):
 
 
 @njit(cache=True, error_model="numpy")
-def _fall(x):
-    """Φ: friction from the neck to a height over it."""
-    t = x / np.sqrt(1.0 + x * x)
+def _fall(x, square):
+    """Φ: friction from the neck to a height over it, of x / √square."""
+    t = x / np.sqrt(square + x * x)
     return t - t * t * t / 3.0
 
 
@@ -187,8 +187,7 @@ def _patch(a, b, to_vertex, radius, normal, scale, end, drop):
             w = wa * a[1] + wb * b[1] + wc * c[1]
             q = wa * a[2] + wb * b[2] + wc * c[2]
             far = u * u + w * w + q * q
-            t = height / np.sqrt(far + height * height)
-            left = min(max(1.0 - (t - t * t * t / 3.0) / end, 0.0), 1.0)
+            left = min(max(1.0 - _fall(height, far) / end, 0.0), 1.0)
             # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
             solid = _WEIGHTS[i] * _SHARES[j] * (1.0 - wc) * volume / (far * far)
             seen += abs(solid) * np.sqrt(far)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.facets import circle_portions, facet_sections, facet_volumes, inscribed_circles, row_sums, tied_facets
+from porefv.circles import circle_portions, inscribed_circles
+from porefv.facets import facet_sections, facet_volumes, row_sums, tied_facets
 
 if TYPE_CHECKING:
     from porefv.mesh import PoreMesh

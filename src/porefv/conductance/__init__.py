@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit, prange
 
 from porefv.boundary import LEAST, MOST, within_range
 from porefv.conductance.sections import SectionFriction
 from porefv.errors import InputError
+from porefv.kernels import njit, prange
 from porefv.throats import Throats
 
 
