@@ -53,6 +53,7 @@ class Row:
     spheres: int = 0
     pores: int = 0
     closed: int = 0
+    closing: float = 0.0
     hidden: int = 0
     permeability: float = np.nan
     imbalance: float = np.nan
@@ -85,6 +86,7 @@ def measure(case: Case) -> Row:
         return row
     throats, report = flow.mesh.throats, flow.solver_report
     row.pores, row.closed = flow.mesh.n_pores, int(np.count_nonzero(flow.conductances == 0.0))
+    row.closing = flow.closing_error
     row.hidden = len(flow.mesh.triangulation.hidden)
     row.permeability = flow.permeability
     row.imbalance, row.floor, row.iterations = report.imbalance, report.floor, report.iterations
@@ -462,8 +464,9 @@ def line(row: Row) -> str:
         )
     over = f" (floor {power(row.floor)})" if row.imbalance > 1e-10 else ""
     hidden = f", {row.hidden} hidden" if row.hidden else ""
+    closing = f" ({power(row.closing)})" if row.closing > 0.0 else ""
     return (
-        f"| {row.case.name} | {row.spheres}{hidden} | {row.pores} | {row.closed} | {row.permeability:.5g} | "
+        f"| {row.case.name} | {row.spheres}{hidden} | {row.pores} | {row.closed}{closing} | {row.permeability:.5g} | "
         f"{power(row.imbalance)}{over} | {power(row.forces)} | {power(row.copy)} | {power(row.condition)} | "
         f"{row.iterations} | {row.seconds:.2f} s |"
     )

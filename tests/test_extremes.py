@@ -1,5 +1,6 @@
 """What must hold at the extremes: of contrast, size, place, overlap, memory, and of files half written."""
 
+import dataclasses
 import os
 import resource
 import signal
@@ -273,6 +274,37 @@ def test_forces_add_up_however_deep_the_overlap(unit_flow, radius):
     assert flow.forces.conservation_residual < 1e-12
 
 
+@dataclasses.dataclass(frozen=True)
+class Opened:
+    """A model whose throats without conductance are round holes of a part of their area."""
+
+    model: object
+    part: float
+    name = "opened"
+
+    def conductivity(self, throats, slip):
+        found = self.model.conductivity(throats, slip)
+        images = throats.mirror_images(slip)
+        holes = np.sqrt(self.part * images * throats.areas / np.pi) ** 3 / (3 * images) * throats.lengths
+        return np.where(found > 0.0, found, holes)
+
+
+@pytest.mark.parametrize("model", [SectionFriction, HydraulicRadius])
+@pytest.mark.parametrize("factor", [1.0, 1.15, 1.2, 1.25])
+def test_closed_throats_cost_no_more_than_the_error_told(reference, model, factor):
+    mesh = PoreMesh(resized(reference("n200_s1"), factor), wall_tolerance=0.9)
+    flow = PoreFlow(mesh, Walls.along("y", slip=True), Fluid(1.0), model())
+    assert 0.0 <= flow.closing_error < 1e-3
+    doubtful = (flow.conductances == 0.0) & ~mesh.throats.covered
+    assert (flow.closing_error > 0.0) == doubtful.any() == (factor > 1.0)
+    mesh.throats.closed = mesh.throats.covered
+    for part in (0.01, 0.3, 1.0):
+        opened = PoreFlow(mesh, Walls.along("y", slip=True), Fluid(1.0), Opened(model(), part))
+        assert ((opened.conductances > 0.0) == ((flow.conductances > 0.0) | doubtful)).all()
+        assert flow.permeability * (1.0 - 1e-9) < opened.permeability
+        assert opened.permeability < flow.permeability / (1.0 - flow.closing_error) * (1.0 + 1e-9)
+
+
 # ---- throats of no shape -------------------------------------------------------------------------------------
 
 
@@ -376,8 +408,6 @@ def test_a_model_that_gives_no_number_is_an_error(reference, value):
 
 
 def test_a_force_that_is_no_number_cannot_pass_for_conserved(reference, unit_flow):
-    import dataclasses
-
     forces = unit_flow(PoreMesh(reference("n25_s1")), Walls.along("y")).forces
     broken = dataclasses.replace(forces, pressure=np.full_like(forces.pressure, np.nan))
     assert np.isnan(broken.conservation_residual)

@@ -88,6 +88,7 @@ def _summary_text(results: Results) -> str:
             ("hidden spheres", packing["hidden_spheres"] or None),
             ("overlapping pairs", _count(packing['overlapping_pairs'])),
             ("porosity", f"{packing['porosity']:.6g}"),
+            ("porosity error", _bound(packing["porosity_error"], "too high, where three spheres meet")),
             ("pore volume", f"{packing['pore_volume']:.6g} m³"),
         ]),
         ("Pores", [
@@ -120,6 +121,7 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("conductance", flow["conductance"]),
         ("inflow", f"{flow['inflow']:.6g} m³/s"),
         ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
     if "permeability" in summary:
         rows += [
@@ -137,6 +139,10 @@ def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     rows.append(("walls, total", f"({_vector(sums['wall_total'])}) N"))
     rows.append(("force balance", f"{summary['forces']['conservation_residual']:.1e}"))
     return rows
+
+
+def _bound(error: float | None, of_what: str) -> str | None:
+    return f"at most {error:.1e} {of_what}" if error else None
 
 
 def _solver_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:

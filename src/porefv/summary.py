@@ -113,6 +113,7 @@ def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
             "inflow": flow.inflow,
             "outflow": flow.outflow,
             "imbalance": flow.imbalance,
+            "closing_error": flow.closing_error,
             "wall_flux": flow.wall_flux,
         },
         "unusual": _unusual(flow),

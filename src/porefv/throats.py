@@ -306,10 +306,15 @@ class Throats:
             images[self._total(has.astype(float)) > 0.0] *= 2.0
         return images
 
+    @property
+    def covered(self) -> np.ndarray:
+        """(t,) bool: throats whose spheres cover the facet between them."""
+        return self.facet_covered[self.first_facets]
+
     @cached_property
     def closed(self) -> np.ndarray:
         """(t,) bool: throats without a fluid cross-section: A^f <= 0, or covered by their spheres. Nothing flows."""
-        return (self.fluid_areas <= 0.0) | self.facet_covered[self.first_facets]
+        return (self.fluid_areas <= 0.0) | self.covered
 
     def __repr__(self) -> str:
         return f"Throats({len(self)} throats between {self.mesh.n_pores} pores)"
