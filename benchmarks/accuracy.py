@@ -41,12 +41,12 @@ FITTED = tuple(
 BLIND = tuple(
     f"{name}_{kind}"
     for name in (
-        "float_0.1_off", "float_0.2_off", "loose_n12_r2_s5_f0.8", "loose_n16_r1_s11_f0.7", "loose_n16_r1_s11_f0.9",
-        "loose_n16_r5_s6_f0.9", "loose_n20_r2_s7_f0.85", "loose_n8_r2_s2_f0.8", "press_n12_r10_s4", "press_n20_r10_s8",
-        "press_n30_r1_s10", "press_n8_r2_s2", "rnd_n12_r2_p0.85_s4", "rnd_n12_r5_p0.85_s3", "sc8_c0.5",
+        "fines_n8_m15_d8_s32", "fines_n8_m6_d6_s31", "loose_n14_r4_s23_f0.92", "loose_n18_r8_s25_f0.85",
+        "n25_s1_more0.2", "n25_s1_more0.5", "press_n14_r4_s23", "press_n18_r8_s25", "press_n24_r2_s24",
+        "rnd_n10_r3_p0.65_s21", "rnd_n14_r2_p0.75_s22",
     )
     for kind in ("no_slip", "symmetry")
-) + ("press_n20_r2_s7_no_slip",)  # fmt: skip
+)  # fmt: skip
 KINDS = ("interior", "wall", "edge")
 ZICK_HOMSY = {
     0.008: 1.525,
@@ -304,13 +304,14 @@ def forces(out: Path | None) -> None:
         line, walls = f"{case.name:34}", ""
         for shares in ("surface", "drag"):
             unit = facet_forces(mesh, reference.walls.slip, shares)
-            for pressure in (flow.pressure, at_vertex, mean):
+            computed = flow.acting_pressure
+            for pressure in (computed, at_vertex, mean):
                 of_cell = np.where(np.isnan(held), pressure, held)[mesh.cell_pore]
                 drops = of_cell[mesh.facet_cells[:, 0]] - of_cell[mesh.facet_cells[:, 1]]
                 total = np.zeros((mesh.n_spheres + 6, 3))
                 np.add.at(total, mesh.facet_vertices, unit * drops[:, None, None])
                 line += f"{100 * relative_rms(total[: mesh.n_spheres], exact):11.1f}%"
-                if pressure is flow.pressure and not reference.walls.slip.any():
+                if pressure is computed and not reference.walls.slip.any():
                     # The thrust is 1: what spheres do not take along the flow, walls do.
                     walls += f"{(1.0 - total[: mesh.n_spheres, 1].sum()) / (1.0 - exact[:, 1].sum()):8.2f}"
         print(line + walls)

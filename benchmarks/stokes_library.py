@@ -24,13 +24,18 @@ from porefv.reference import Options, stokes_reference
 DATA = Path(__file__).parent.parent / "data"
 UNIT = Box([0, 0, 0], [1, 1, 1])
 # Clouds, or grown to a porosity: number of grains, r_max / r_min, porosity, seed.
-RANDOM = [(8, 1, 0.8, 1), (10, 2, 0.7, 2), (12, 5, 0.85, 3), (12, 2, 0.85, 4), (8, 1, 0.5, 6)]
+RANDOM = [
+    (8, 1, 0.8, 1), (10, 2, 0.7, 2), (12, 5, 0.85, 3), (12, 2, 0.85, 4), (8, 1, 0.5, 6), (10, 3, 0.65, 21),
+    (14, 2, 0.75, 22),
+]  # fmt: skip
 # Grown until they press: number, r_max / r_min, seed, then radii of all times these factors.
 PRESSED = [
     (8, 2, 2, (1.0, 0.8)), (10, 5, 3, (1.0,)), (12, 10, 4, (1.0, 0.9)), (12, 2, 5, (1.0, 0.95, 0.8)),
     (16, 5, 6, (1.0, 0.9)), (16, 1, 11, (1.0, 0.9, 0.7)), (20, 2, 7, (1.0, 0.85)), (20, 10, 8, (1.0, 0.9)),
-    (30, 2, 9, (1.0,)), (30, 1, 10, (1.0,)),
+    (30, 2, 9, (1.0,)), (30, 1, 10, (1.0,)), (14, 4, 23, (1.0, 0.92)), (18, 8, 25, (1.0, 0.85)), (24, 2, 24, (1.0,)),
 ]  # fmt: skip
+# Fines in the voids of eight pressed grains: how many, how much smaller than the smallest, seed.
+FINES = [(6, 6, 31), (15, 8, 32)]
 
 
 def stored(name: str) -> Packing:
@@ -81,6 +86,30 @@ def loosened(number: int, ratio: float, seed: int, factor: float) -> Packing:
     return Packing(pressed.centres, factor * pressed.radii, UNIT)
 
 
+def with_fines(number: int, smaller: float, seed: int) -> Packing:
+    """Eight grains that press, and fines at random in their voids, none of which touches anything."""
+    grains = grown(8, 2, 2, stress=1500.0)
+    radius = grains.radii.min() / smaller
+    centres, radii = grains.centres, grains.radii
+    rng = np.random.default_rng(seed)
+    while len(radii) < 8 + number:
+        place = rng.uniform(1.5 * radius, 1.0 - 1.5 * radius, 3)
+        if (np.linalg.norm(centres - place, axis=1) > radii + 1.5 * radius).all():
+            centres, radii = np.vstack([centres, place]), np.append(radii, radius)
+    return Packing(centres, radii, UNIT)
+
+
+def one_more(name: str, part: float) -> Packing:
+    """A packing, and in the widest of its pores a grain of a part of the radius that fits there."""
+    packing = stored(name)
+    vertices = PoreMesh(packing).vertices
+    gaps = [np.min(np.linalg.norm(packing.centres - x, axis=1) - packing.radii) for x in vertices]
+    walls = np.minimum(vertices, 1.0 - vertices).min(axis=1)
+    room = np.minimum(gaps, walls)
+    widest = int(room.argmax())
+    return Packing(np.vstack([packing.centres, vertices[widest]]), np.append(packing.radii, part * room[widest]), UNIT)
+
+
 def cases() -> dict[str, Callable[[], Packing]]:
     """Every packing, by name."""
     found: dict[str, Callable[[], Packing]] = {"bcc9": body_centred, "fcc14": face_centred}
@@ -100,6 +129,10 @@ def cases() -> dict[str, Callable[[], Packing]]:
         for factor in factors:
             kind, end = ("press", "") if factor == 1.0 else ("loose", f"_f{factor:g}")
             found[f"{kind}_n{number}_r{ratio}_s{seed}{end}"] = lambda row=(number, ratio, seed, factor): loosened(*row)
+    for number, smaller, seed in FINES:
+        found[f"fines_n8_m{number}_d{smaller}_s{seed}"] = lambda row=(number, smaller, seed): with_fines(*row)
+    for part in (0.2, 0.5):
+        found[f"n25_s1_more{part:g}"] = lambda part=part: one_more("n25_s1", part)
     return found
 
 

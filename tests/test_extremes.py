@@ -43,12 +43,12 @@ def with_fines(packing, ratio, count=60):
     """Fines at random in the voids, smaller than the smallest grain by the ratio."""
     rng = np.random.default_rng(0)
     radius = packing.radii.min() / ratio
-    places = []
-    while len(places) < count:
+    centres, radii = packing.centres, packing.radii
+    while len(radii) < len(packing) + count:
         place = rng.uniform(radius, 1 - radius, 3)
-        if (np.linalg.norm(packing.centres - place, axis=1) > packing.radii + radius).all():
-            places.append(place)
-    return Packing(np.vstack([packing.centres, places]), np.append(packing.radii, np.full(count, radius)), packing.box)
+        if (np.linalg.norm(centres - place, axis=1) > radii + radius).all():
+            centres, radii = np.vstack([centres, place]), np.append(radii, radius)
+    return Packing(centres, radii, packing.box)
 
 
 @pytest.mark.parametrize("ratio", [10, 1e3, 1e4])
@@ -187,28 +187,56 @@ def test_mirror_images_between_walls_of_symmetry_have_the_permeability_of_one(re
 
 # How much a grain may raise the permeability: nothing, if throats were Stokes problems. To the models of conductance
 # dust in a pore makes throats shorter, and hardly narrower (docs/extremes.md).
-RISE = {HydraulicRadius: 0.03, EffectiveRadius: 0.03, SectionFriction: 0.015}
+RISE = {HydraulicRadius: 0.13, EffectiveRadius: 0.11, SectionFriction: 0.001}
 
 
-def widest_pore(packing):
-    mesh = PoreMesh(packing)
-    places = mesh.vertices[((mesh.vertices > 0) & (mesh.vertices < 1)).all(axis=1)]
-    gaps = np.minimum(places, 1 - places).min(axis=1)
+def widest_pores(packing, count):
+    """Places and radii of the largest spheres that fit at vertices of pores, no two of them in one void."""
+    places = PoreMesh(packing).vertices
+    places = places[((places > 0) & (places < 1)).all(axis=1)]
+    room = np.minimum(places, 1 - places).min(axis=1)
     for centre, radius in zip(packing.centres, packing.radii, strict=True):
-        gaps = np.minimum(gaps, np.linalg.norm(places - centre, axis=1) - radius)
-    return places[gaps.argmax()], gaps.max()
+        room = np.minimum(room, np.linalg.norm(places - centre, axis=1) - radius)
+    kept = []
+    for k in np.argsort(-room, kind="stable"):
+        if all(np.linalg.norm(places[k] - places[other]) > 0.5 * room[k] for other in kept):
+            kept.append(k)
+    return places[kept[:count]], room[kept[:count]]
+
+
+def with_one_more(packing, place, radius, model):
+    more = Packing(np.vstack([packing.centres, place]), np.append(packing.radii, radius), packing.box)
+    return PoreFlow(more, Walls.along("y"), conductance=model()).permeability
 
 
 @pytest.mark.parametrize("model", RISE)
-@pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "n200_s1"])
+@pytest.mark.parametrize("name", ["sc8", "n25_s1", "n54_s1", "n200_s1"])
 def test_one_more_grain_lowers_the_permeability(reference, name, model):
     packing = reference(name)
-    place, widest = widest_pore(packing)
+    (place,), (room,) = widest_pores(packing, 1)
     before = PoreFlow(packing, Walls.along("y"), conductance=model()).permeability
-    for size in (0.01, 0.1, 0.5, 1.0):
-        more = Packing(np.vstack([packing.centres, place]), np.append(packing.radii, size * widest), packing.box)
-        after = PoreFlow(more, Walls.along("y"), conductance=model()).permeability
+    for size in (0.001, 0.01, 0.1, 0.3, 0.5, 1.0):
+        after = with_one_more(packing, place, size * room, model)
         assert after < before * (1.0 + (RISE[model] if size < 1.0 else 0.0))
+
+
+@pytest.mark.parametrize("name", ["n25_s1", "n54_s1"])
+def test_one_more_grain_lowers_the_permeability_in_the_mean_of_pores(reference, name):
+    packing = reference(name)
+    places, rooms = widest_pores(packing, 20)
+    before = PoreFlow(packing, Walls.along("y")).permeability
+    for size in (0.01, 0.2, 0.6):
+        after = [with_one_more(packing, x, size * r, SectionFriction) for x, r in zip(places, rooms, strict=True)]
+        assert np.mean(after) < before
+        assert max(after) < 1.008 * before
+
+
+@pytest.mark.parametrize("ratio", [10, 100, 1e4])
+def test_fines_that_float_in_voids_leave_the_permeability_alone(reference, ratio):
+    # 500 of them; the hydraulic radius has it rise by a quarter to a third.
+    packing = reference("n200_s1")
+    before, after = (PoreFlow(p, Walls.along("y")).permeability for p in (packing, with_fines(packing, ratio, 500)))
+    assert_allclose(after, before, rtol=0.07)
 
 
 @pytest.mark.parametrize("model", RISE)
@@ -216,7 +244,7 @@ def test_larger_grains_lower_the_permeability(reference, model):
     packing = reference("n200_s1")
     k = [
         PoreFlow(resized(packing, f), Walls.along("y"), conductance=model()).permeability
-        for f in (0.5, 0.7, 0.9, 0.99, 1.0, 1.01, 1.03)
+        for f in (0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0, 1.01, 1.03)
     ]
     assert (np.diff(k) < 0.0).all()
 

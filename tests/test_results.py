@@ -207,7 +207,7 @@ def test_failure_keeps_what_existed(flow, tmp_path, monkeypatch):
 
 
 def test_missing_vtk_is_said_before_any_computation(flow, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "vtkmodules", None)
+    monkeypatch.setitem(sys.modules, "vtkmodules.vtkCommonDataModel", None)
     fresh = PoreFlow(flow.mesh, flow.walls)
     with pytest.raises(InputError, match="pip install"):
         results.write(fresh, tmp_path / "results")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.boundary import Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius
@@ -287,3 +287,57 @@ def test_circle_between_a_sphere_and_two_walls_touches_them_or_is_centred_on_the
     one_slips = np.arange(6) == 0
     rho = mesh.throats.inscribed_radii(one_slips)[t]
     assert_allclose(np.hypot(a, b - rho), r + rho, rtol=1e-13)
+
+
+# ---- centres of pores ----------------------------------------------------------------------------------------
+
+
+def test_centres_are_vertices_among_equal_spheres(reference):
+    packing = reference("n25_s1")
+    mesh = PoreMesh(Packing(packing.centres, np.full(25, packing.radii.min()), packing.box))
+    assert_array_equal(mesh.throats.centres, mesh.local_vertices)
+
+
+@pytest.mark.parametrize("radius", [1e-12, 0.05, 0.1])
+def test_a_speck_draws_the_centres_of_the_pores_around_it(reference, radius):
+    # Between eight spheres of 0.25 on a lattice: six pores around it, cut in two, with their vertices in square necks.
+    eight = reference("sc8")
+    mesh = PoreMesh(Packing(np.vstack([eight.centres, [[0.5] * 3]]), np.append(eight.radii, radius), eight.box))
+    around = (mesh.cells == 8).any(axis=1)
+    assert around.sum() == 12
+    place = mesh.local_points[8]
+    vertices = mesh.local_vertices[around] - place
+    heights = np.abs(vertices).max(axis=1)
+    drawn = np.where(heights > 0.25, 1.0, 0.0)  # the vertex of a speck with a surface lies beyond the neck
+    wanted = 0.5 * (1.0 - radius / 0.25) * 0.25
+    part = (wanted - (0.25 - heights)) / heights
+    assert drawn.all() or radius < 1e-6
+    assert_allclose(mesh.throats.centres[around] - place, vertices * (1.0 - part)[:, None], atol=1e-12)
+    assert_array_equal(mesh.throats.centres[~around], mesh.local_vertices[~around])
+
+
+def test_centres_are_drawn_as_far_as_they_say(reference):
+    # Once more, pore by pore, for those of one cell.
+    mesh = PoreMesh(reference("n54_s1"))
+    throats, n = mesh.throats, mesh.n_spheres
+    alone = np.bincount(mesh.cell_pore)[mesh.cell_pore] == 1
+    drawn = 0
+    for c in np.flatnonzero(alone):
+        vertex = mesh.local_vertices[c]
+        parts, ways = [], np.zeros((0, 3))
+        for f, side in zip(*np.nonzero(mesh.facet_cells == c), strict=True):
+            (apex,) = set(mesh.cells[c]) - set(mesh.facet_vertices[f])
+            spheres = [k for k in mesh.facet_vertices[f] if k < n]
+            if apex >= n or mesh.sizes[apex] >= min(mesh.sizes[spheres]):
+                continue
+            inward = throats.facet_normals[f] * (1 if side == 1 else -1)
+            height, above = ((x - mesh.local_points[spheres[0]]) @ inward for x in (vertex, mesh.local_points[apex]))
+            wanted = 0.5 * (1 - mesh.sizes[apex] / min(mesh.sizes[spheres])) * above
+            if height < wanted:
+                parts.append(min(1, above / mesh.sizes[apex]) * (wanted - height) / (above - height))
+                ways = np.vstack([ways, parts[-1] * (mesh.local_points[apex] - vertex)])
+        moved = np.average(ways, axis=0, weights=parts) if parts else np.zeros(3)
+        moved[(mesh.cells[c][mesh.cells[c] >= n] - n) // 2] = 0.0  # on a wall, the image behind draws, too
+        assert_allclose(throats.centres[c], vertex + moved, atol=1e-14)
+        drawn += len(parts) > 0
+    assert drawn > 20

@@ -14,7 +14,7 @@ import numpy as np
 from porefv.boundary import LEAST, MOST, Walls, within_range
 from porefv.conductance import AUTO, ConductanceModel
 from porefv.errors import ComputationError, InputError
-from porefv.forces import Forces, fluid_forces
+from porefv.forces import Forces, acting_pressure, acting_weights, fluid_forces
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
 from porefv.pressure import PressureSolution, solve_network
@@ -57,10 +57,7 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
     """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
     throats = mesh.throats
     conductivity = model.conductivity(throats, slip)
-    # A throat between Laguerre vertices closer than rounding is not longer than that.
-    shortest = np.finfo(float).eps * float(mesh.packing.radii.min())
-    lengths = np.maximum(throats.lengths, shortest)
-    lengths *= viscosity
+    lengths = viscosity * throats.effective_lengths
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
         conductances = np.divide(conductivity, lengths, out=lengths)
     conductances[(conductivity <= 0.0) | throats.closed] = 0.0
@@ -188,6 +185,17 @@ class PoreFlow:
         """(n_pores,): piezometric pressure of each pore [Pa]."""
         return self.solution.pressure + self._reference
 
+    @cached_property
+    def _acting_pressure(self) -> np.ndarray:
+        held = ~np.isnan(self._held)
+        weights = acting_weights(self.mesh, self.conductance, self.conductances, self.walls.slip, held)
+        return acting_pressure(self.mesh, weights, self.solution.pressure)
+
+    @property
+    def acting_pressure(self) -> np.ndarray:
+        """(n_pores,): piezometric pressure that acts on the solid of each pore (`forces.acting_weights`) [Pa]."""
+        return self._acting_pressure + self._reference
+
     @property
     def cell_pressure(self) -> np.ndarray:
         """(n_cells,): piezometric pressure of each cell [Pa]."""
@@ -307,11 +315,11 @@ class PoreFlow:
     @cached_property
     def forces(self) -> Forces:
         """Forces on every sphere and wall."""
-        pressure = self.solution.pressure
+        _ = self.solution  # timed by itself
         with self._timed("forces"):
             forces = fluid_forces(
                 self.mesh,
-                pressure,
+                self._acting_pressure,
                 ~np.isnan(self.walls.pressures),
                 self.walls.slip,
                 reference=self._reference,

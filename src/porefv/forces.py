@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +15,17 @@ from porefv.mesh import PoreMesh
 from porefv.packing import WALLS
 from porefv.patches import add_patches
 
+if TYPE_CHECKING:
+    from porefv.conductance import ConductanceModel
+
 SHARES = ("surface", "drag")
 # Throats whose forces are at hand at a time.
 BLOCK = 1 << 16
 # Shear on a sphere with much room, over u / r with u the throat's mean speed: fitted. In an unbounded stream 1.5.
 SHEAR = 1.4
+# Where between the centre of a pore and its Laguerre vertex the pressure is that acts on its solid: fitted, too, to
+# the force on small free grains.
+ACTING = 2.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +104,7 @@ def fluid_forces(
     ----------
     mesh : PoreMesh
     pressure : (n_pores,) array
-        Piezometric pressure of each pore less the reference [Pa].
+        Piezometric pressure that acts on the solid of each pore (`acting_pressure`) less the reference [Pa].
     pressure_walls, slip : (6,) bool arrays
         Walls of imposed pressure; walls that do not drag the fluid.
     reference : float
@@ -148,6 +155,49 @@ def fluid_forces(
         thrust=thrust,
         scale=max(spread, abs(reference)) * float(sections.max()),
     )
+
+
+def acting_weights(
+    mesh: PoreMesh, model: ConductanceModel, conductances: np.ndarray, slip: np.ndarray, held: np.ndarray
+) -> np.ndarray | None:
+    """How the pressure that acts on the solid of a pore leans towards those of other pores; None if it never does.
+
+    A model that has throats begin at the centres of pores (`Throats.centres`) knows the pressure there. Forces want it
+    on the surfaces around, nearer to the Laguerre vertices: other by part of what throats lose in between.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    model : ConductanceModel
+        With a method `beyond_vertices`, or none.
+    conductances : (t,) array
+    slip : (6,) bool array
+    held : (n_pores,) bool array
+        Pores of imposed pressure, which is that on their solid.
+
+    Returns
+    -------
+    (t, 2) array: weights w of each throat's other pore for its first and its second pore, which adds w (p_other - p).
+    In each pore they add up to 1 at most.
+    """
+    if not hasattr(model, "beyond_vertices"):
+        return None
+    pores = mesh.throats.pores
+    weights = ACTING * model.beyond_vertices(mesh.throats, slip)
+    weights[(conductances == 0.0)[:, None] | held[pores]] = 0.0
+    if not weights.any():
+        return None
+    sums = np.bincount(pores.ravel(), weights.ravel(), mesh.n_pores)
+    return weights / np.maximum(sums, 1.0)[pores]
+
+
+def acting_pressure(mesh: PoreMesh, weights: np.ndarray | None, pressure: np.ndarray) -> np.ndarray:
+    """(n_pores,): pressure that acts on the solid of each pore, from those at their centres and `acting_weights`."""
+    if weights is None:
+        return pressure
+    pores = mesh.throats.pores
+    leaning = weights * (pressure[pores[:, ::-1]] - pressure[pores])
+    return pressure + np.bincount(pores.ravel(), leaning.ravel(), mesh.n_pores)
 
 
 def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> np.ndarray:

@@ -153,6 +153,12 @@ class PoreMesh:
     def n_pores(self) -> int:
         return int(self.cell_pore.max()) + 1
 
+    @cached_property
+    def cells_of_pores(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cells in the order of their pores (m,), and where those of each pore begin (n_pores + 1,)."""
+        order = np.argsort(self.cell_pore, kind="stable")
+        return order, np.searchsorted(self.cell_pore[order], np.arange(self.n_pores + 1))
+
     @property
     def n_united(self) -> int:
         """Number of pores lost to uniting: cells less pores."""

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import InputError, MissingExtraError
+from porefv import extras
+from porefv.errors import InputError
 from porefv.io.atomic import atomic_directory
 from porefv.packing import WALLS
 from porefv.progress import Progress
@@ -270,11 +271,7 @@ class Results:
 
     def _read_vtk(self, name: str) -> Any:
         path = self._file(name, "set vtk = true")
-        try:
-            import pyvista
-        except ModuleNotFoundError:
-            raise MissingExtraError("pyvista", f"Reading {name}") from None
-        return pyvista.read(path)
+        return extras.load("pyvista", f"Reading {name}").read(path)
 
 
 def _force_row(number: int, line: str) -> tuple[Any, ...]:

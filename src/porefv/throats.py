@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from porefv.centres import draw, pore_centres
 from porefv.circles import circle_portions, inscribed_circles
 from porefv.facets import facet_sections, facet_volumes, row_sums, tied_facets
 
@@ -154,6 +155,20 @@ class Throats:
         order = np.argsort(throat, kind="stable")
         return facets[order], np.searchsorted(throat[order], np.arange(len(self) + 1))
 
+    @cached_property
+    def centres(self) -> np.ndarray:
+        """(m, 3): centre of each cell's pore from the local origin: its vertex, drawn towards small spheres [m]."""
+        mesh = self.mesh
+        order, firsts = mesh.cells_of_pores
+        facets, starts = self.facets_of_throats
+        parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
+        draw(
+            facets, starts, mesh.facet_cells, mesh.facet_vertices, mesh.cells, order, firsts, mesh.cell_pore,
+            mesh.n_spheres, mesh.local_points, mesh.sizes, mesh.local_vertices, self.facet_normals, parts,
+        )  # fmt: skip
+        pore_centres(mesh.cells, order, firsts, mesh.n_spheres, mesh.local_points, mesh.local_vertices, parts, centres)
+        return centres
+
     def _total(self, values: np.ndarray) -> np.ndarray:
         """(t,): sum of facet values (f,) over each throat."""
         totals = values[self.first_facets]
@@ -198,6 +213,11 @@ class Throats:
     def lengths(self) -> np.ndarray:
         """(t,): length L of each throat, between its Laguerre vertices [m]."""
         return self.facet_lengths[self.first_facets]
+
+    @property
+    def effective_lengths(self) -> np.ndarray:
+        """(t,): lengths, those at the level of rounding or below as 2.2e-16 of the smallest radius [m]."""
+        return np.maximum(self.lengths, np.finfo(float).eps * float(self.mesh.packing.radii.min()))
 
     @cached_property
     def areas(self) -> np.ndarray:

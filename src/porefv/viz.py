@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv import extras
 from porefv.boundary import Walls
-from porefv.errors import ComputationError, InputError, MissingExtraError
+from porefv.errors import ComputationError, InputError
 from porefv.io.atomic import atomic_write
 
 if TYPE_CHECKING:
@@ -248,10 +249,7 @@ def _pyvista() -> Any:
     # Without a display VTK would first try, and complain.
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    try:
-        import pyvista
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyvista", "Drawing a picture") from None
+    pyvista = extras.load("pyvista", "Drawing a picture")
     _check_drawing()
     return pyvista
 

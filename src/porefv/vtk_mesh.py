@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv import extras
 from porefv.errors import InputError, MissingExtraError
 from porefv.mesh import PoreMesh
 
@@ -174,10 +175,7 @@ def to_pyvista(mesh: PoreMesh, **cell_data: Any) -> pyvista.UnstructuredGrid:
     InputError
         If an array has a row for neither each cell nor each pore.
     """
-    try:
-        import pyvista
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyvista", "PoreMesh.to_pyvista()") from None
+    pyvista = extras.load("pyvista", "PoreMesh.to_pyvista()")
     return pyvista.UnstructuredGrid(cells_grid(mesh, **cell_data))
 
 
@@ -232,12 +230,12 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
 
 def vtk_data_model() -> Any:
     """VTK's data structures; MissingExtraError if VTK is not installed."""
+    return _vtk("vtkCommonDataModel")
+
+
+def _vtk(module: str) -> Any:
     # vtkmodules loads in half the time of pyvista, which is not needed to write files.
-    try:
-        from vtkmodules import vtkCommonDataModel
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyvista", "Writing VTK files") from None
-    return vtkCommonDataModel
+    return extras.load(f"vtkmodules.{module}", "Writing VTK files")
 
 
 def write_xml(dataset: vtkUnstructuredGrid | vtkPolyData, path: Path) -> None:
@@ -250,9 +248,8 @@ def write_xml(dataset: vtkUnstructuredGrid | vtkPolyData, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
-
-    writer = vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else vtkXMLPolyDataWriter()
+    writers = _vtk("vtkIOXML")
+    writer = writers.vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else writers.vtkXMLPolyDataWriter()
     writer.SetInputData(dataset)
     writer.SetFileName(str(path))
     writer.SetDataModeToAppended()
@@ -264,15 +261,11 @@ def write_xml(dataset: vtkUnstructuredGrid | vtkPolyData, path: Path) -> None:
 
 
 def _vtk_array(values: np.ndarray):
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
-    return numpy_to_vtk(np.ascontiguousarray(values))
+    return _vtk("util.numpy_support").numpy_to_vtk(np.ascontiguousarray(values))
 
 
 def vtk_points(points: np.ndarray):
-    from vtkmodules.vtkCommonCore import vtkPoints
-
-    vtk_points = vtkPoints()
+    vtk_points = _vtk("vtkCommonCore").vtkPoints()
     vtk_points.SetData(_vtk_array(points))
     return vtk_points
 

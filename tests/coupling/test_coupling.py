@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Wall, Walls
-from porefv.conductance import MODELS
+from porefv.conductance import MODELS, SectionFriction
 from porefv.coupling import Coupling, Exchange, checkpoint
 from porefv.dem import DEM, Material, Plate
 from porefv.errors import InputError
+from porefv.forces import acting_weights
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 SEALED = Walls.from_mapping({"lateral": {"slip": True}})
@@ -41,10 +42,14 @@ def sample(reference):
 # ---- the operator ----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=["facets", "volumes"])
+@pytest.fixture(params=["facets", "leaning", "volumes"])
 def exchange(request, reference):
-    mesh = PoreMesh(reference("n54_s1"))
-    return mesh, Exchange.of(mesh, request.param, np.array([True] * 4 + [False] * 2))
+    mesh, slip = PoreMesh(reference("n54_s1")), np.array([True] * 4 + [False] * 2)
+    if request.param != "leaning":
+        return mesh, Exchange.of(mesh, request.param, slip)
+    flow = PoreFlow(mesh, Walls(z_max=Wall(pressure=1.0), **dict.fromkeys(("x_min", "x_max"), Wall(slip=True))))
+    weights = acting_weights(mesh, SectionFriction(), flow.conductances, slip, ~np.isnan(flow.imposed_pressures))
+    return mesh, Exchange.of(mesh, "facets", slip, shares="drag", weights=weights)
 
 
 def test_rates_of_all_pores_add_up_to_that_of_the_box(exchange):
@@ -96,8 +101,12 @@ def test_facet_forces_are_those_of_a_steady_flow(reference, slip, model):
     packing = reference("n54_s1")
     walls = Walls.along("y", slip=slip)
     flow = PoreFlow(packing, walls, conductance=model())
+    held = ~np.isnan(flow.imposed_pressures)
+    weights = acting_weights(flow.mesh, flow.conductance, flow.conductances, walls.slip, held)
+    assert (weights is not None) == (model is SectionFriction)
     shares = getattr(model, "shares", "surface")
-    grains, _ = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares).forces(flow.cell_pressure, len(packing))
+    operator = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares, weights=weights)
+    grains, _ = operator.forces(flow.cell_pressure, len(packing))
     assert_allclose(grains, flow.forces.pressure + flow.forces.viscous, atol=1e-13)
 
 

@@ -21,9 +21,7 @@ from porefv.throats import Throats
 STRETCH = np.sqrt(0.5)
 # The part of its growth that a section loses to other throats, on the way to the pore's vertex where they all meet.
 NARROWING = 2.0 / 3.0
-# A pore whose vertex lies at a neck or beyond it has this part of the throat's length on its side of the neck yet: what
-# leaves the pores of a cubic lattice alone when a vanishing sphere in them draws the vertices into the necks.
-REACH = 0.1
+LEAST_SPAN = 0.1
 # Beyond its poles a sphere still slows the fluid down: at s > r as a disc of this part of its radius times (r / s)².
 LEAST_DISC = 0.3
 # Four points in either half of a throat integrate its friction within some 0.3 %.
@@ -35,13 +33,13 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 class SectionFriction:
     """Friction summed over the cross-sections of a throat: L / (μ g) = ∫ (c₁ P + 2 c₂ A / r) / (A² w) ds.
 
-    A(s) and P(s) are a section's fluid area and wetted perimeter, w its opening, and r a mean radius of the spheres, ∛r
-    weighed by their angles. Fluid that passes with q / A on average and is at rest on the perimeter is sheared
+    A(s) and P(s) are a section's fluid area and wetted perimeter, w its opening, and r a mean radius of the spheres,
+    ∛r² weighed by their angles. Fluid that passes with q / A on average and is at rest on the perimeter is sheared
     by q / (A w), which on all of the perimeter makes the first part. The second, for round bodies, is greater the
     further they are apart, and alone is left where there is much more room than grains: a drag in proportion to r.
 
-    s runs between √½ times the heights of the pores' vertices, a tenth of the length to either side of the neck at
-    least. On its way to a vertex at h the section grows by 1 - 2 s / 3 h of what the prism's does.
+    s runs between √½ times the heights of the pores' centres (`Throats.centres`). On its way to a centre at h the
+    section grows by 1 - 2 s / 3 h of what the prism's does.
 
     w = λ^{3/2} max(√(A / (π χ)), 2 A / P). λ, the radius of the circle inscribed in the neck over that of the circle of
     the neck's area, keeps the flow out of cusps; χ is the part of the inscribed circle that lies within the throat, the
@@ -65,26 +63,46 @@ class SectionFriction:
                 raise InputError(f"{what} must be a positive number between {LEAST:g} and {MOST:g}, not {value!r}")
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        return self._friction(throats, slip, np.arange(len(throats)))[0]
+
+    def beyond_vertices(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        """(t, 2): part of each throat's drop that is lost between the Laguerre vertex and the centre of either pore.
+
+        Zero where the centre is not further from the neck than the vertex.
+        """
         mesh = throats.mesh
-        conductivity = np.empty(len(throats))
+        first = mesh.facet_cells[throats.first_facets]
+        moves = throats.centres - mesh.local_vertices
+        away = np.stack([-(moves[first[:, 0]] * throats.normals).sum(1), (moves[first[:, 1]] * throats.normals).sum(1)])
+        which = np.flatnonzero((away > 0.0).any(axis=0))
+        beyond = np.zeros((len(throats), 2))
+        beyond[which] = self._friction(throats, slip, which)[1]
+        return beyond
+
+    def _friction(self, throats: Throats, slip: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of some throats (u,): conductivity (u,), and parts of the drop beyond the vertices (u, 2)."""
+        mesh = throats.mesh
+        conductivity, beyond = np.empty(len(which)), np.empty((len(which), 2))
         facets, starts = throats.facets_of_throats
         _section_friction(
-            facets, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
-            mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.lengths,
-            throats.fluid_areas, throats.roundness(slip), throats.inscribed_circles(slip)[1], np.asarray(slip, bool),
-            self.friction, self.curvature, conductivity,
+            which, facets, starts, mesh.facet_vertices, mesh.facet_cells, mesh.n_spheres,
+            mesh.local_points, mesh.sizes, mesh.local_vertices, throats.centres, throats.facet_normals,
+            throats.effective_lengths, throats.fluid_areas, throats.roundness(slip), throats.inscribed_circles(slip)[1],
+            np.asarray(slip, bool), self.friction, self.curvature, conductivity, beyond,
         )  # fmt: skip
-        return conductivity
+        return conductivity, beyond
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _section_friction(
-    facets, starts, facet_vertices, facet_cells, n, points, sizes, vertices, normals, lengths, areas,
-    roundness, portions, slip, c1, c2, conductivity,
+    which, facets, starts, facet_vertices, facet_cells, n, points, sizes, vertices, centres, normals, lengths, areas,
+    roundness, portions, slip, c1, c2, conductivity, beyond,
 ):  # fmt: skip
-    """Length of each throat over the friction of its sections, 0 without a fluid area."""
-    for t in prange(areas.shape[0]):
-        conductivity[t] = 0.0
+    """Length over friction of each throat, 0 without a fluid area, and the parts of its friction beyond vertices."""
+    for row in prange(which.shape[0]):
+        t = which[row]
+        conductivity[row] = 0.0
+        beyond[row] = 0.0
         if areas[t] <= 0.0:
             continue
         f = facets[starts[t]]
@@ -102,22 +120,40 @@ def _section_friction(
         radius = 0.0
         for v in range(radii.shape[0]):
             if radii[v] > 0.0:
-                radius += angles[v] * np.cbrt(radii[v] / widest)
-        radius = widest * (radius / turn) ** 3
+                radius += angles[v] * np.cbrt(radii[v] / widest) ** 2
+        radius = widest * np.sqrt(radius / turn) ** 3
         shape = areas[t], wall, radii, angles, portions[t], roundness[t] ** 1.5, radius, c1, c2
         neck = np.sqrt(2.0 * areas[t] / turn)
-        low = _dot(_minus(_at(facet_cells[f, 0], vertices), _at(facet_vertices[f, 0], points)), _at(f, normals))
-        high = low + lengths[t]
-        begin = STRETCH * min(low, max(low, 0.0) - REACH * lengths[t])
-        end = STRETCH * max(high, min(high, 0.0) + REACH * lengths[t])
+        begin, end = _span(f, facet_cells, facet_vertices, points, centres, normals, lengths[t])
+        first, last = _span(f, facet_cells, facet_vertices, points, vertices, normals, lengths[t])
         if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
-            conductivity[t] = 1.0 / _friction(abs(end), abs(end), shape)
-        elif begin < 0.0 and end > 0.0:
-            total = _between(0.0, -begin, widest, neck, shape) + _between(0.0, end, widest, neck, shape)
-            conductivity[t] = STRETCH * lengths[t] / total
-        else:
-            near, far = min(abs(begin), abs(end)), max(abs(begin), abs(end))
-            conductivity[t] = STRETCH * lengths[t] / _between(near, far, widest, neck, shape)
+            conductivity[row] = 1.0 / _friction(abs(end), abs(end), shape)
+            continue
+        total = 0.0
+        if begin < 0.0:
+            total += _between(max(-end, 0.0), -begin, widest, neck, shape)
+        if end > 0.0:
+            total += _between(max(begin, 0.0), end, widest, neck, shape)
+        conductivity[row] = STRETCH * lengths[t] / total
+        if -begin > max(-first, -end, 0.0):
+            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, widest, neck, shape) / total
+        if end > max(last, begin, 0.0):
+            beyond[row, 1] = _between(max(last, begin, 0.0), end, widest, neck, shape) / total
+
+
+@njit(cache=True)
+def _span(f, facet_cells, facet_vertices, points, ends, normals, length):
+    """Heights over facet f, times √½, between which its throat extends: of the ends of its two pores.
+
+    A tenth of the throat's length is left to it at least, should centres have come closer than its vertices.
+    """
+    first = _at(facet_vertices[f, 0], points)
+    low = _dot(_minus(_at(facet_cells[f, 0], ends), first), _at(f, normals))
+    high = _dot(_minus(_at(facet_cells[f, 1], ends), first), _at(f, normals))
+    least = LEAST_SPAN * length
+    if high - low < least:
+        low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
+    return STRETCH * low, STRETCH * high
 
 
 @njit(cache=True)
@@ -149,7 +185,7 @@ def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
 
 @njit(cache=True, error_model="numpy")
 def _friction(s, reach, shape):
-    """Resistance of a unit of length at height s over the neck, on the way to a pore's vertex at height `reach`."""
+    """Resistance of a unit of length at height s over the neck, on the way to a pore's centre at height `reach`."""
     neck, perimeter, radii, angles, portion, roundness, radius, c1, c2 = shape
     growth = 0.0
     for v in range(radii.shape[0]):

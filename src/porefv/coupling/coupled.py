@@ -18,7 +18,8 @@ from porefv.coupling.exchange import EXCHANGES, Exchange
 from porefv.coupling.fluid import PoreFluid, Power
 from porefv.dem.protocol import GrainModel
 from porefv.errors import InputError
-from porefv.flow import Fluid, throat_conductances
+from porefv.flow import Fluid, held_pressures, throat_conductances
+from porefv.forces import acting_weights
 from porefv.mesh import PoreMesh
 from porefv.packing import WALLS, Packing
 from porefv.threads import threads_for
@@ -250,7 +251,9 @@ class Coupling:
             if self.options["end_correction"]:
                 conductances = corrected(mesh, conductances, pressures)
             shares = getattr(self.conductance, "shares", "surface")
-            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots, shares=shares)
+            held = ~np.isnan(held_pressures(mesh, pressures))
+            weights = acting_weights(mesh, self.conductance, conductances, slip, held)
+            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots, shares=shares, weights=weights)
             drag = np.empty(len(packing))
             drag[grains.slots] = grains.step / grains.masses
             self._choose(lambda mobilities: PoreFluid(mesh, exchange, conductances, pressures, mobilities), drag)

@@ -3,9 +3,9 @@
 One operator E serves for both, so that the work of the fluid on the grains is the work it takes from the pores, to
 the last digit. There are two such operators:
 
-- `facets`: Eᵀ is the force operator S of C12 (eq. 14, 17, 18), so that forces are those of a steady flow. E = Sᵀ is
-  then the rate of the fluid's volume in a pore whose throats move with the mean velocity of the solids around them,
-  each weighted by its wetted surface: what the throat's flow is relative to, by reciprocity.
+- `facets`: Eᵀ is the force operator S of a steady flow, by C12 (eq. 14, 17, 18) or as its model of conductance has
+  it. E = Sᵀ is then the rate of the fluid's volume in a pore whose throats move with the mean velocity of the solids
+  around them, each weighted by its wetted surface: what the throat's flow is relative to, by reciprocity.
 - `volumes`: E is the exact derivative of the volume of the pore's cells, solid included; Eᵀ shares the force on a
   facet equally among its three vertices.
 
@@ -28,17 +28,17 @@ EXCHANGES = ("facets", "volumes")
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """The operator E, cell by cell.
+    """The operator E, cell by cell, and once more for each neighbour whose pressure acts on the cell's solid.
 
     Attributes
     ----------
-    rows : (m, 4) uint32 array
+    rows : (e, 4) uint32 array
         Row of each vertex of each cell in arrays of velocities or forces: grains, then the six walls.
-    gradients : (m, 4, 3) array
-        What a pressure of 1 in the cell does to each vertex [m²].
-    nodes : (m,) uint32 array
-        Entry of each cell in arrays of pressures or volume rates. (Indices without sign need no look at whether they
-        count from the end.)
+    gradients : (e, 4, 3) array
+        What a pressure of 1 at the node does to each vertex [m²].
+    nodes : (e,) uint32 array
+        Entry in arrays of pressures or volume rates: the cell itself, or one of the neighbour's. (Indices without sign
+        need no look at whether they count from the end.)
     """
 
     rows: np.ndarray
@@ -54,6 +54,7 @@ class Exchange:
         slots: np.ndarray | None = None,
         *,
         shares: str = "surface",
+        weights: np.ndarray | None = None,
     ) -> Exchange:
         """The operator of a mesh.
 
@@ -67,22 +68,44 @@ class Exchange:
             Row of each grain, its id by default.
         shares : {'surface', 'drag'}
             How vertices share the drag of a throat, where forces are by facets (see `fluid_forces`).
+        weights : (t, 2) array, optional
+            How the pressures of other pores act on the solid of a pore, by facets (see `acting_weights`).
         """
         n = mesh.n_spheres
         gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, shares)
         number = np.arange(n + 6, dtype=np.uint32)
         if slots is not None:
             number[:n] = slots
-        return cls(number[mesh.cells], gradients, np.arange(mesh.n_cells, dtype=np.uint32))
+        found = cls(number[mesh.cells], gradients, np.arange(mesh.n_cells, dtype=np.uint32))
+        return found if kind == "volumes" or weights is None else found._leaning(mesh, weights)
+
+    def _leaning(self, mesh: PoreMesh, weights: np.ndarray) -> Exchange:
+        """The same with pressures of neighbours acting on the solid of pores, by these weights."""
+        order, firsts = mesh.cells_of_pores
+        throat, side = np.nonzero(weights)
+        pores = mesh.throats.pores
+        here, there = pores[throat, side], pores[throat, 1 - side]
+        count = firsts[here + 1] - firsts[here]
+        which = np.repeat(np.arange(len(throat)), count)  # a throat's side for every cell of its pore
+        within = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        cells = order[firsts[here[which]] + within]
+        factors = weights[throat, side][which, None, None]
+        kept = 1.0 - np.bincount(pores.ravel(), weights.ravel(), mesh.n_pores)[mesh.cell_pore]
+        return Exchange(
+            np.concatenate([self.rows, self.rows[cells]]),
+            np.concatenate([kept[:, None, None] * self.gradients, factors * self.gradients[cells]]),
+            np.concatenate([self.nodes, order[firsts[there[which]]].astype(np.uint32)]),
+        )
 
     def between(self, nodes: np.ndarray) -> Exchange:
         """The same with these entries (m,) for the cells, without the cells where they are negative."""
+        nodes = nodes[self.nodes]
         used = nodes >= 0
         return Exchange(self.rows[used], self.gradients[used], nodes[used].astype(np.uint32))
 
     def rates(self, velocities: np.ndarray, wall_velocities: np.ndarray) -> np.ndarray:
         """(m,): E ẋ of each cell, from velocities (n, 3) of the grains and (6, 3) of the walls [m³/s]."""
-        out = np.zeros(len(self.rows))
+        out = np.zeros(int(self.nodes.max()) + 1)
         self.gather(np.concatenate([velocities, wall_velocities]), out)
         return out
 

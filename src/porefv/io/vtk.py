@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from porefv.errors import InputError, MissingExtraError
+from porefv import extras
+from porefv.errors import InputError
 from porefv.io.atomic import atomic_write
 from porefv.io.text import AnyPath, make_box, quoted, read_bytes
 from porefv.io.vtk_legacy import LegacyMesh
@@ -56,7 +57,7 @@ def write(packing: Packing, path: AnyPath) -> None:
     """Write points with point data ``radius``, and the box as field data, to a .vtp file."""
     if Path(path).suffix != ".vtp":
         raise InputError(f"{path}: a packing is written to the VTK format with the extension .vtp.")
-    points = _pyvista("Writing VTK files").PolyData(np.array(packing.centres))
+    points = extras.load("pyvista", "Writing VTK files").PolyData(np.array(packing.centres))
     points.point_data["radius"] = np.array(packing.radii)
     if packing.box is not None:
         for name, corner in zip(_CORNERS, (packing.box.lower, packing.box.upper), strict=True):
@@ -81,7 +82,7 @@ def _read_mesh(path: AnyPath) -> Any:
         return LegacyMesh(path, content)
     if not content[:100].lstrip().startswith((b"<?xml", b"<VTKFile")):
         raise InputError(f"{path}: not a VTK file (legacy .vtk, or XML .vtp or .vtu).")
-    pyvista = _pyvista("Reading VTK files")
+    pyvista = extras.load("pyvista", "Reading VTK files")
     # A damaged size makes VTK ask for more memory than there is, and that ends the process: let it be another one.
     trial = subprocess.run([sys.executable, "-c", _TRIAL, os.fspath(path)], capture_output=True, check=False)
     if trial.returncode != 0:
@@ -110,11 +111,3 @@ def _box(path: AnyPath, mesh: Any) -> Box | None:
     if missing:
         raise InputError(f"{path}: field data {missing[0]} is missing.")
     return make_box(path, *(np.ravel(mesh.field_data[name]) for name in _CORNERS))
-
-
-def _pyvista(purpose: str) -> Any:
-    try:
-        import pyvista
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyvista", purpose) from None
-    return pyvista
