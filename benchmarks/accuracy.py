@@ -101,6 +101,13 @@ class Case:
         return drops
 
     @cached_property
+    def between_vertices(self) -> np.ndarray:
+        """(t,): throats of which no end has been drawn from its Laguerre vertex, where pressures were resolved."""
+        throats = self.mesh.throats
+        drawn = np.abs(throats.centres - self.mesh.local_vertices).max(axis=1) > 0.0
+        return ~drawn[self.mesh.facet_cells[throats.first_facets]].any(axis=1)
+
+    @cached_property
     def walls_of_throats(self) -> np.ndarray:
         """(t,): on how many walls each throat is: 0 interior, 1 wall, 2 edge of the box."""
         return (self.mesh.facet_vertices[self.mesh.throats.first_facets] >= self.mesh.n_spheres).sum(axis=1)
@@ -256,7 +263,7 @@ def throats_of(case: Case, column: int, kind: int) -> np.ndarray:
     flux, spent = case.reference.throat_flux(case.mesh), dissipation(case, column)
     drops = case.drops[:, column]
     conductances = np.stack([case.flow(model).conductances for model in MODELS], axis=1)
-    rows = (case.walls_of_throats == kind) & (spent > 1e-5) & (conductances > 0.0).all(axis=1)
+    rows = (case.walls_of_throats == kind) & case.between_vertices & (spent > 1e-5) & (conductances > 0.0).all(axis=1)
     return np.column_stack([spent, flux / np.where(drops == 0.0, 1.0, drops), conductances])[rows]
 
 
@@ -268,7 +275,8 @@ def by_shape(found: list[Case]) -> None:
         lengths = case.mesh.throats.lengths / np.sqrt(np.maximum(case.mesh.throats.fluid_areas, 1e-300) / np.pi)
         flux = case.reference.throat_flux(case.mesh)
         conductances = np.stack([case.flow(model).conductances for model in MODELS[1:]], axis=1)
-        rows = (case.walls_of_throats == 0) & np.isfinite(case.drops).all(axis=1) & (conductances > 0.0).all(axis=1)
+        rows = (case.walls_of_throats == 0) & case.between_vertices & np.isfinite(case.drops).all(axis=1)
+        rows &= (conductances > 0.0).all(axis=1)
         scale = 1.0 / case.reference.permeability
         drops, flux = case.drops[rows], flux[rows, None]
         table.append(np.column_stack([lengths[rows], drops * flux * scale, flux**2 * scale / conductances[rows]]))

@@ -50,7 +50,7 @@ def run(*arguments, **options):
 def test_solve_writes_results_and_says_where(scene, capsys):
     assert main(["solve", str(scene)]) == 0
     said = capsys.readouterr()
-    assert re.search(r"25 spheres, 122 pores, permeability 0\.000189\d+ m², force balance", said.out)
+    assert re.search(r"25 spheres, 122 pores, permeability 0\.000190\d+ m², force balance", said.out)
     assert f"results in {scene.parent / 'results'}" in said.out
     assert said.err == ""
     assert sorted(p.name for p in (scene.parent / "results").iterdir()) == ["forces.csv", "summary.json"]
@@ -89,7 +89,7 @@ def test_info_prints_a_summary(scene, capsys):
     assert main(["info", str(scene.parent / "results")]) == 0
     out = capsys.readouterr().out
     for line in (
-        r"Packing\n", r"  porosity +0\.5335", r"  throats +240\n", r"  permeability +0\.000189\d+ m²\n",
+        r"Packing\n", r"  porosity +0\.5335", r"  throats +240\n", r"  permeability +0\.000190\d+ m²\n",
         r"  hydraulic conductivity +\S+ m/s\n", r"  force balance +\S+\n", r"  solver +direct, .* imbalance",
     ):  # fmt: skip
         assert re.search(line, out), line
