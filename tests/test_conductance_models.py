@@ -348,7 +348,7 @@ def test_facet_forces_and_fluid_forces_share_alike(reference, unit_flow):
 def test_the_pressure_that_acts_is_one_between_those_of_neighbours(reference, name):
     flow = PoreFlow(reference(name), Walls.along("y"))
     mesh, pressure, held = flow.mesh, flow.pressure, ~np.isnan(flow.imposed_pressures)
-    weights = acting_weights(mesh, flow.conductance, flow.conductances, flow.walls.slip, held)
+    leaning = acting_weights(mesh, flow.conductance, flow.conductances, flow.walls.slip, held)
     assert acting_weights(mesh, HydraulicRadius(), flow.conductances, flow.walls.slip, held) is None
     acting = flow.acting_pressure
     lowest, highest = pressure.copy(), pressure.copy()
@@ -357,7 +357,7 @@ def test_the_pressure_that_acts_is_one_between_those_of_neighbours(reference, na
             lowest[here], highest[here] = min(lowest[here], pressure[other]), max(highest[here], pressure[other])
     assert (acting > lowest - 1e-12).all() and (acting < highest + 1e-12).all()
     assert_array_equal(acting[held], pressure[held])
-    assert_array_equal(acting_pressure(mesh, weights, np.full(mesh.n_pores, 3.0)), 3.0)
+    assert_array_equal(acting_pressure(leaning, np.full(mesh.n_pores, 3.0)), 3.0)
     assert np.count_nonzero(acting != pressure) >= 2  # the pores before and behind the small grain, and more
 
 

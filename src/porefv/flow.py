@@ -188,8 +188,8 @@ class PoreFlow:
     @cached_property
     def _acting_pressure(self) -> np.ndarray:
         held = ~np.isnan(self._held)
-        weights = acting_weights(self.mesh, self.conductance, self.conductances, self.walls.slip, held)
-        return acting_pressure(self.mesh, weights, self.solution.pressure)
+        leaning = acting_weights(self.mesh, self.conductance, self.conductances, self.walls.slip, held)
+        return acting_pressure(leaning, self.solution.pressure)
 
     @property
     def acting_pressure(self) -> np.ndarray:

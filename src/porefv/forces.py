@@ -159,7 +159,7 @@ def fluid_forces(
 
 def acting_weights(
     mesh: PoreMesh, model: ConductanceModel, conductances: np.ndarray, slip: np.ndarray, held: np.ndarray
-) -> np.ndarray | None:
+) -> tuple[np.ndarray, np.ndarray] | None:
     """How the pressure that acts on the solid of a pore leans towards those of other pores; None if it never does.
 
     A model that has throats begin at the centres of pores (`Throats.centres`) knows the pressure there. Forces want it
@@ -177,27 +177,30 @@ def acting_weights(
 
     Returns
     -------
-    (t, 2) array: weights w of each throat's other pore for its first and its second pore, which adds w (p_other - p).
-    In each pore they add up to 1 at most.
+    pores : (u, 2) array
+        Pores of the throats by which pressures lean.
+    weights : (u, 2) array
+        w of the other pore for the first and the second, which adds w (p_other - p). In each pore they add up to 1 at
+        most.
     """
     if not hasattr(model, "beyond_vertices"):
         return None
-    pores = mesh.throats.pores
-    weights = ACTING * model.beyond_vertices(mesh.throats, slip)
-    weights[(conductances == 0.0)[:, None] | held[pores]] = 0.0
+    throats, beyond = model.beyond_vertices(mesh.throats, slip)
+    pores = mesh.throats.pores[throats]
+    weights = np.where((conductances[throats] == 0.0)[:, None] | held[pores], 0.0, ACTING * beyond)
     if not weights.any():
         return None
     sums = np.bincount(pores.ravel(), weights.ravel(), mesh.n_pores)
-    return weights / np.maximum(sums, 1.0)[pores]
+    return pores, weights / np.maximum(sums, 1.0)[pores]
 
 
-def acting_pressure(mesh: PoreMesh, weights: np.ndarray | None, pressure: np.ndarray) -> np.ndarray:
+def acting_pressure(leaning: tuple[np.ndarray, np.ndarray] | None, pressure: np.ndarray) -> np.ndarray:
     """(n_pores,): pressure that acts on the solid of each pore, from those at their centres and `acting_weights`."""
-    if weights is None:
+    if leaning is None:
         return pressure
-    pores = mesh.throats.pores
-    leaning = weights * (pressure[pores[:, ::-1]] - pressure[pores])
-    return pressure + np.bincount(pores.ravel(), leaning.ravel(), mesh.n_pores)
+    pores, weights = leaning
+    towards = weights * (pressure[pores[:, ::-1]] - pressure[pores])
+    return pressure + np.bincount(pores.ravel(), towards.ravel(), len(pressure))
 
 
 def facet_forces(mesh: PoreMesh, slip: np.ndarray, shares: str = "surface") -> np.ndarray:

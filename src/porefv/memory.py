@@ -9,8 +9,8 @@ from pathlib import Path
 from porefv.errors import ComputationError
 
 # Peak resident size of a flow with forces, by benchmarks/scale.py --conductance auto: 6 pores a sphere, 1 kB a pore.
-BYTES_PER_SPHERE = 6_200
-BYTES_PER_CELL = 1_050
+BYTES_PER_SPHERE = 6_800
+BYTES_PER_CELL = 1_150
 _LOADED = 200 * 2**20  # Python, numpy, scipy, numba and the kernels
 
 # Limits of the process: the place in /proc/self/statm of what counts towards each, and what libraries and each thread

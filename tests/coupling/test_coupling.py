@@ -48,8 +48,8 @@ def exchange(request, reference):
     if request.param != "leaning":
         return mesh, Exchange.of(mesh, request.param, slip)
     flow = PoreFlow(mesh, Walls(z_max=Wall(pressure=1.0), **dict.fromkeys(("x_min", "x_max"), Wall(slip=True))))
-    weights = acting_weights(mesh, SectionFriction(), flow.conductances, slip, ~np.isnan(flow.imposed_pressures))
-    return mesh, Exchange.of(mesh, "facets", slip, shares="drag", weights=weights)
+    leaning = acting_weights(mesh, SectionFriction(), flow.conductances, slip, ~np.isnan(flow.imposed_pressures))
+    return mesh, Exchange.of(mesh, "facets", slip, shares="drag", leaning=leaning)
 
 
 def test_rates_of_all_pores_add_up_to_that_of_the_box(exchange):
@@ -102,10 +102,10 @@ def test_facet_forces_are_those_of_a_steady_flow(reference, slip, model):
     walls = Walls.along("y", slip=slip)
     flow = PoreFlow(packing, walls, conductance=model())
     held = ~np.isnan(flow.imposed_pressures)
-    weights = acting_weights(flow.mesh, flow.conductance, flow.conductances, walls.slip, held)
-    assert (weights is not None) == (model is SectionFriction)
+    leaning = acting_weights(flow.mesh, flow.conductance, flow.conductances, walls.slip, held)
+    assert (leaning is not None) == (model is SectionFriction)
     shares = getattr(model, "shares", "surface")
-    operator = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares, weights=weights)
+    operator = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares, leaning=leaning)
     grains, _ = operator.forces(flow.cell_pressure, len(packing))
     assert_allclose(grains, flow.forces.pressure + flow.forces.viscous, atol=1e-13)
 

@@ -65,19 +65,17 @@ class SectionFriction:
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         return self._friction(throats, slip, np.arange(len(throats)))[0]
 
-    def beyond_vertices(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
-        """(t, 2): part of each throat's drop that is lost between the Laguerre vertex and the centre of either pore.
+    def beyond_vertices(self, throats: Throats, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Throats (u,) of a pore with its centre further from their neck than its Laguerre vertex, few as a rule.
 
-        Zero where the centre is not further from the neck than the vertex.
+        And the parts (u, 2) of their drop that are lost between vertex and centre of the first and of the second pore.
         """
         mesh = throats.mesh
         first = mesh.facet_cells[throats.first_facets]
         moves = throats.centres - mesh.local_vertices
         away = np.stack([-(moves[first[:, 0]] * throats.normals).sum(1), (moves[first[:, 1]] * throats.normals).sum(1)])
         which = np.flatnonzero((away > 0.0).any(axis=0))
-        beyond = np.zeros((len(throats), 2))
-        beyond[which] = self._friction(throats, slip, which)[1]
-        return beyond
+        return which, self._friction(throats, slip, which)[1]
 
     def _friction(self, throats: Throats, slip: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of some throats (u,): conductivity (u,), and parts of the drop beyond the vertices (u, 2)."""

@@ -252,8 +252,8 @@ class Coupling:
                 conductances = corrected(mesh, conductances, pressures)
             shares = getattr(self.conductance, "shares", "surface")
             held = ~np.isnan(held_pressures(mesh, pressures))
-            weights = acting_weights(mesh, self.conductance, conductances, slip, held)
-            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots, shares=shares, weights=weights)
+            leaning = acting_weights(mesh, self.conductance, conductances, slip, held)
+            exchange = Exchange.of(mesh, self.options["exchange"], slip, grains.slots, shares=shares, leaning=leaning)
             drag = np.empty(len(packing))
             drag[grains.slots] = grains.step / grains.masses
             self._choose(lambda mobilities: PoreFluid(mesh, exchange, conductances, pressures, mobilities), drag)

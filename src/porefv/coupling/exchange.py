@@ -54,7 +54,7 @@ class Exchange:
         slots: np.ndarray | None = None,
         *,
         shares: str = "surface",
-        weights: np.ndarray | None = None,
+        leaning: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> Exchange:
         """The operator of a mesh.
 
@@ -68,7 +68,7 @@ class Exchange:
             Row of each grain, its id by default.
         shares : {'surface', 'drag'}
             How vertices share the drag of a throat, where forces are by facets (see `fluid_forces`).
-        weights : (t, 2) array, optional
+        leaning : two (u, 2) arrays, optional
             How the pressures of other pores act on the solid of a pore, by facets (see `acting_weights`).
         """
         n = mesh.n_spheres
@@ -77,13 +77,12 @@ class Exchange:
         if slots is not None:
             number[:n] = slots
         found = cls(number[mesh.cells], gradients, np.arange(mesh.n_cells, dtype=np.uint32))
-        return found if kind == "volumes" or weights is None else found._leaning(mesh, weights)
+        return found if kind == "volumes" or leaning is None else found._leaning(mesh, *leaning)
 
-    def _leaning(self, mesh: PoreMesh, weights: np.ndarray) -> Exchange:
+    def _leaning(self, mesh: PoreMesh, pores: np.ndarray, weights: np.ndarray) -> Exchange:
         """The same with pressures of neighbours acting on the solid of pores, by these weights."""
         order, firsts = mesh.cells_of_pores
         throat, side = np.nonzero(weights)
-        pores = mesh.throats.pores
         here, there = pores[throat, side], pores[throat, 1 - side]
         count = firsts[here + 1] - firsts[here]
         which = np.repeat(np.arange(len(throat)), count)  # a throat's side for every cell of its pore
