@@ -146,7 +146,7 @@ def test_a_packing_for_which_the_limit_leaves_no_room_is_refused_before_work_sta
     limit = 2 * GIB - spare + memory.required(50_000)
     done = run(SOLVE, "RLIMIT_AS", limit, "solve", path)
     assert done.returncode == 1
-    assert done.stderr.startswith("porefv: error: 100000 spheres need about 791 MiB of memory, "), done.stderr
+    assert done.stderr.startswith("porefv: error: 100000 spheres need about 848 MiB of memory, "), done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert sorted(p.name for p in path.parent.iterdir()) == ["grains.csv", "scene.toml"]
 
