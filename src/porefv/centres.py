@@ -18,8 +18,10 @@ DRAWN = 0.5
 
 
 @njit(cache=True)
-def draw(facets, starts, facet_cells, facet_vertices, cells, order, firsts, pores, n, points, sizes, vertices, normals,
-         parts):  # fmt: skip
+def drawn_parts(
+    facets, starts, facet_cells, facet_vertices, cells, order, firsts, pores, n, points, sizes, vertices, normals,
+    parts,
+):  # fmt: skip
     """Parts (m, 4) of the way from a pore's vertex to each sphere of its cells by which that sphere draws the centre.
 
     A throat asks that the centre be at (1 - r / r_n) / 2 of the height H that the sphere of radius r has over the

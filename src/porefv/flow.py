@@ -208,7 +208,7 @@ class PoreFlow:
 
     # ---- fluxes -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _drop(self) -> np.ndarray:
         """(t,): fall of pressure along each throat [Pa]."""
         p, rest = self.solution.pressure, self.solution.rest
@@ -301,6 +301,8 @@ class PoreFlow:
         """
         throats = self.mesh.throats
         doubtful = np.flatnonzero((self.conductances == 0.0) & ~throats.covered)
+        if len(doubtful) == 0:
+            return 0.0
         images = throats.mirror_images(self.walls.slip)[doubtful]
         radii = np.sqrt(images * throats.areas[doubtful] / np.pi)
         holes = radii**3 / (3.0 * self.fluid.viscosity * images)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.centres import draw, pore_centres
+from porefv.centres import drawn_parts, pore_centres
 from porefv.circles import circle_portions, inscribed_circles
 from porefv.facets import facet_sections, facet_volumes, row_sums, tied_facets
 
@@ -162,7 +162,7 @@ class Throats:
         order, firsts = mesh.cells_of_pores
         facets, starts = self.facets_of_throats
         parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
-        draw(
+        drawn_parts(
             facets, starts, mesh.facet_cells, mesh.facet_vertices, mesh.cells, order, firsts, mesh.cell_pore,
             mesh.n_spheres, mesh.local_points, mesh.sizes, mesh.local_vertices, self.facet_normals, parts,
         )  # fmt: skip

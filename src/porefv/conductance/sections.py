@@ -19,8 +19,9 @@ from porefv.throats import Throats
 
 # A hyperboloid as wide at its neck as it is long, which four spheres make, loses pressure over √2 times that length.
 STRETCH = np.sqrt(0.5)
-# The part of its growth that a section loses to other throats, on the way to the pore's vertex where they all meet.
+# The part of its growth that a section loses to other throats, on the way to the pore's centre where they all meet.
 NARROWING = 2.0 / 3.0
+# The part of its length that a throat keeps, should the centres of its pores have come closer than their vertices.
 LEAST_SPAN = 0.1
 # Beyond its poles a sphere still slows the fluid down: at s > r as a disc of this part of its radius times (r / s)².
 LEAST_DISC = 0.3
@@ -143,7 +144,7 @@ def _section_friction(
 def _span(f, facet_cells, facet_vertices, points, ends, normals, length):
     """Heights over facet f, times √½, between which its throat extends: of the ends of its two pores.
 
-    A tenth of the throat's length is left to it at least, should centres have come closer than its vertices.
+    `LEAST_SPAN` of the throat's length is left to it.
     """
     first = _at(facet_vertices[f, 0], points)
     low = _dot(_minus(_at(facet_cells[f, 0], ends), first), _at(f, normals))

@@ -189,7 +189,7 @@ class PoreFluid:
         """Of the matrix itself where drag rules it, else of the network with a part of the drag in its throats."""
         mesh = self.mesh
         drags = np.zeros(mesh.n_spheres + 6)
-        rows = self.exchange.rows[: mesh.n_cells]
+        rows = self.exchange.rows[: mesh.n_cells]  # of the cells themselves; the others are for their neighbours
         drags[mesh.cells.ravel()] = np.append(self.mobilities, np.zeros(6))[rows.ravel()]
         vertices = mesh.facet_vertices[mesh.throats.first_facets]
         drag = drags[vertices].sum(axis=1) * (mesh.throats.areas / 3.0) ** 2
