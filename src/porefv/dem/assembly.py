@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numba import get_num_threads
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
+from porefv.dem.material import Material, Plate, check_number
 from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, advance, wall_excess
+from porefv.dem.state import Contacts, Energies
 from porefv.errors import ComputationError, InputError
 from porefv.kernels import njit
 from porefv.neighbours import neighbour_pairs
@@ -27,127 +28,6 @@ _RUNAWAY = 0.1
 _GAIN = 0.8
 # Part of the smallest radius that grains may come closer before pairs are listed anew.
 _SKIN = 0.2
-
-
-@dataclass(frozen=True)
-class Material:
-    """What grains are made of.
-
-    Parameters
-    ----------
-    young : float
-        E of the contact stiffness k_n = 2 E r_i r_j / (r_i + r_j) [Pa].
-    stiffness_ratio : float
-        k_s / k_n.
-    friction_angle : float
-        φ between grains [degrees].
-    density : float
-        Of the solid [kg/m³].
-    """
-
-    young: float = 15.0e6
-    stiffness_ratio: float = 0.5
-    friction_angle: float = 30.0
-    density: float = 2600.0
-
-    def __post_init__(self) -> None:
-        _check(self.young, "young", "a positive modulus in Pa", lambda x: x > 0.0)
-        _check(self.stiffness_ratio, "stiffness_ratio", "zero or a positive number", lambda x: x >= 0.0)
-        _check(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
-        _check(self.density, "density", "a positive density in kg/m³", lambda x: x > 0.0)
-
-    @property
-    def friction(self) -> float:
-        """tan φ."""
-        return math.tan(math.radians(self.friction_angle))
-
-
-@dataclass(frozen=True)
-class Plate:
-    """What a wall does: stand (the default), move, or press.
-
-    Parameters
-    ----------
-    velocity : (3,) sequence of float
-        Of the wall; its component along the wall shears what touches it [m/s].
-    stress : float, optional
-        Normal stress the wall is to press with, positive in compression: it then moves as it must, by
-        servo-control, and its normal velocity is not given [Pa].
-    top_speed : float, optional
-        Largest speed of a pressing wall [m/s].
-    friction_angle : float
-        Between wall and grains [degrees].
-    """
-
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    stress: float | None = None
-    top_speed: float | None = None
-    friction_angle: float = 0.0
-
-    def __post_init__(self) -> None:
-        if len(self.velocity) != 3 or not all(math.isfinite(v) for v in self.velocity):
-            raise InputError(f"the velocity of a wall must be three finite numbers in m/s, not {self.velocity!r}")
-        _check(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
-        if self.stress is not None:
-            _check(self.stress, "stress", "a stress in Pa, zero or more (compression)", lambda x: x >= 0.0)
-            if self.top_speed is None:
-                raise InputError("a wall with a stress needs a top_speed in m/s")
-            _check(self.top_speed, "top_speed", "a positive speed in m/s", lambda x: x > 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """Contacts at this moment: forces on grains from others and from walls.
-
-    Attributes
-    ----------
-    grains : (c, 2) int array
-        Grains i, j of each contact; j = n + w for wall w.
-    normals : (c, 3) array
-        Unit vector from i to j.
-    points : (c, 3) array
-        Middle of the overlap; on the wall, for walls [m].
-    forces : (c, 3) array
-        Force on i [N].
-    overlaps : (c,) array
-        u_n [m].
-    """
-
-    grains: np.ndarray
-    normals: np.ndarray
-    points: np.ndarray
-    forces: np.ndarray
-    overlaps: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.grains)
-
-
-@dataclass(frozen=True)
-class Energies:
-    """Energies [J]: what there is, and what has come and gone since the start.
-
-    Kinetic energy is ½ m v(t - dt/2)·v(t + dt/2) and the like for spins: with it the total is conserved exactly by the
-    leapfrog on linear contacts that neither open nor close, without damping.
-    """
-
-    kinetic: float
-    elastic: float
-    potential: float
-    sliding: float
-    damping: float
-    walls: float
-    applied: float
-
-    @property
-    def stored(self) -> float:
-        """Kinetic, elastic and potential energy."""
-        return self.kinetic + self.elastic + self.potential
-
-    @property
-    def balance(self) -> float:
-        """Stored and dissipated energy less work done on the grains: constant, but for the error of the steps."""
-        return self.stored + self.sliding + self.damping - self.walls - self.applied
 
 
 class DEM:
@@ -204,7 +84,7 @@ class DEM:
         self.gravity = np.array(gravity, float)
         if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
             raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
-        _check(damping, "damping", "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
+        check_number(damping, "damping", "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
         self.damping = float(damping)
         _check_grains(packing)
         assert packing.box is not None  # _check_grains has seen to it
@@ -241,7 +121,7 @@ class DEM:
         critical = self.critical_step
         if step is None:
             step = SAFETY * critical
-        _check(step, "step", "a positive time in s", lambda x: x > 0.0)
+        check_number(step, "step", "a positive time in s", lambda x: x > 0.0)
         if step >= critical:
             raise InputError(
                 f"a step of {step:.4g} s is above the critical one, {critical:.4g} s (√(m/k) of the lightest grain and "
@@ -277,7 +157,7 @@ class DEM:
 
     def scale_radii(self, factor: float) -> None:
         """Grow or shrink all grains about their centres; the step keeps its part of the critical one."""
-        _check(factor, "factor", "a positive number", lambda x: x > 0.0)
+        check_number(factor, "factor", "a positive number", lambda x: x > 0.0)
         part = self.step / self.critical_step
         self._state[:, 3] *= factor
         self._measure_grains()
@@ -667,11 +547,6 @@ class DEM:
 
     def __repr__(self) -> str:
         return f"DEM({len(self)} grains, {self.steps} steps of {self.step:.3g} s, porosity {self.porosity:.4f})"
-
-
-def _check(value: object, name: str, what: str, holds) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or not holds(value):
-        raise InputError(f"{name} must be {what}, not {value!r}")
 
 
 def _across(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:

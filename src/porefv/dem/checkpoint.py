@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from porefv import __version__
-from porefv.dem.assembly import DEM, Material, Plate
+from porefv.dem.assembly import DEM
+from porefv.dem.material import Material, Plate
 from porefv.errors import ComputationError, InputError
 from porefv.io.atomic import atomic_write
 

@@ -14,7 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from porefv.dem.assembly import DEM, Material
+from porefv.dem.assembly import DEM
+from porefv.dem.material import Material
 from porefv.errors import ComputationError, InputError
 from porefv.kernels import njit
 from porefv.packing import Box, Packing

@@ -22,7 +22,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from porefv.dem.assembly import DEM, Contacts
+from porefv.dem.assembly import DEM
+from porefv.dem.state import Contacts
 from porefv.errors import InputError, counted
 from porefv.io.atomic import atomic_write
 

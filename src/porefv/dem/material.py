@@ -1,0 +1,81 @@
+"""What a sample of grains is given: what they are made of, and what its walls do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from porefv.errors import InputError
+
+
+@dataclass(frozen=True)
+class Material:
+    """What grains are made of.
+
+    Parameters
+    ----------
+    young : float
+        E of the contact stiffness k_n = 2 E r_i r_j / (r_i + r_j) [Pa].
+    stiffness_ratio : float
+        k_s / k_n.
+    friction_angle : float
+        φ between grains [degrees].
+    density : float
+        Of the solid [kg/m³].
+    """
+
+    young: float = 15.0e6
+    stiffness_ratio: float = 0.5
+    friction_angle: float = 30.0
+    density: float = 2600.0
+
+    def __post_init__(self) -> None:
+        check_number(self.young, "young", "a positive modulus in Pa", lambda x: x > 0.0)
+        check_number(self.stiffness_ratio, "stiffness_ratio", "zero or a positive number", lambda x: x >= 0.0)
+        check_number(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
+        check_number(self.density, "density", "a positive density in kg/m³", lambda x: x > 0.0)
+
+    @property
+    def friction(self) -> float:
+        """tan φ."""
+        return math.tan(math.radians(self.friction_angle))
+
+
+@dataclass(frozen=True)
+class Plate:
+    """What a wall does: stand (the default), move, or press.
+
+    Parameters
+    ----------
+    velocity : (3,) sequence of float
+        Of the wall; its component along the wall shears what touches it [m/s].
+    stress : float, optional
+        Normal stress the wall is to press with, positive in compression: it then moves as it must, by
+        servo-control, and its normal velocity is not given [Pa].
+    top_speed : float, optional
+        Largest speed of a pressing wall [m/s].
+    friction_angle : float
+        Between wall and grains [degrees].
+    """
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stress: float | None = None
+    top_speed: float | None = None
+    friction_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.velocity) != 3 or not all(math.isfinite(v) for v in self.velocity):
+            raise InputError(f"the velocity of a wall must be three finite numbers in m/s, not {self.velocity!r}")
+        check_number(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
+        if self.stress is not None:
+            check_number(self.stress, "stress", "a stress in Pa, zero or more (compression)", lambda x: x >= 0.0)
+            if self.top_speed is None:
+                raise InputError("a wall with a stress needs a top_speed in m/s")
+            check_number(self.top_speed, "top_speed", "a positive speed in m/s", lambda x: x > 0.0)
+
+
+def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
+    """InputError unless the value is a finite number for which that holds."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or not holds(value):
+        raise InputError(f"{name} must be {what}, not {value!r}")
