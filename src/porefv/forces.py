@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 SHARES = ("surface", "drag")
 # Throats whose forces are at hand at a time.
 BLOCK = 1 << 16
-# Shear on a sphere with much room, over u / r with u the throat's mean speed: fitted. In an unbounded stream 1.5.
-SHEAR = 1.4
-# Where between the centre of a pore and its Laguerre vertex the pressure is that acts on its solid: fitted, too, to
-# the force on small free grains.
-ACTING = 2.0 / 3.0
+# Shear on a sphere with much room, over u / r with u the throat's mean speed: Stokes', in an unbounded stream.
+SHEAR = 1.5
+# Where between the centre of a pore and its Laguerre vertex the pressure is that acts on its solid: fitted to the force
+# on small free grains.
+ACTING = 0.6
 
 
 @dataclass(frozen=True, eq=False)

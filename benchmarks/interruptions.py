@@ -1,0 +1,87 @@
+"""Ctrl-C at any moment of `porefv solve`: how it ends, and what it leaves.
+
+    python benchmarks/interruptions.py [--times 400]
+
+Each run is interrupted at a random moment of the time that a whole one takes. It must end by itself, with a status that
+says so, and leave the whole of its results or nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+PACKING = Path(__file__).resolve().parents[1] / "data" / "packings" / "n2000_s1.csv"
+SCENE = """
+packing = "{packing}"
+[walls]
+y_min = {{ pressure = 1.0 }}
+y_max = {{ pressure = 0.0 }}
+[output]
+directory = "results"
+quantities = ["permeability", "pressure", "forces"]
+vtk = true
+"""
+ENDS = {0: "done", 130: "interrupted, in a line", -signal.SIGINT: "interrupted as Python starts or ends"}
+
+
+def start(folder: Path) -> subprocess.Popen[bytes]:
+    """`porefv solve` in a folder; without a terminal, Ctrl-C would be ignored if it is here."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "porefv", "solve", "scene.toml", "--force", "--quiet"],
+        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env={**os.environ, "PYTHONFAULTHANDLER": "1"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+
+
+def interrupted(folder: Path, after: float) -> tuple[str, str]:
+    """How a run ends that is interrupted after some seconds, and what it leaves."""
+    process = start(folder)
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    try:
+        said = process.communicate(timeout=60)[1].decode()
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return "does not end", ""
+    end = ENDS.get(process.returncode, f"status {process.returncode}: {said.strip()[:80]!r}")
+    names = sorted(path.name for path in folder.iterdir() if path.name != "scene.toml")
+    whole = (folder / "results").is_dir() and len(list((folder / "results").iterdir())) == 5
+    left = "nothing" if not names else "whole results" if whole and names == ["results"] else f"{names}"
+    return end, left
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--times", type=int, default=400)
+    options = parser.parse_args()
+    moments = random.Random(1)
+    counts: Counter[tuple[str, str]] = Counter()
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "scene.toml").write_text(SCENE.format(packing=PACKING), encoding="utf-8")
+        for _ in range(2):  # the first may compile
+            begin = time.perf_counter()
+            start(folder).communicate()
+            whole = time.perf_counter() - begin
+        for _ in range(options.times):
+            if (folder / "results").exists():
+                for path in (folder / "results").iterdir():
+                    path.unlink()
+                (folder / "results").rmdir()
+            counts[interrupted(folder, moments.uniform(0.0, whole))] += 1
+    print(f"{options.times} runs of {whole:.1f} s, interrupted")
+    for (end, left), count in counts.most_common():
+        print(f"{count:5}  {end}; leaves {left}")
+
+
+if __name__ == "__main__":
+    main()
