@@ -19,6 +19,7 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from voids import widest_pores, with_grain
 
 from porefv import Box, EffectiveRadius, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
 from porefv.conductance import ConductanceModel, SectionFriction
@@ -440,13 +441,12 @@ def limits(out: Path | None) -> None:
     print(f"{'grain over what fits':32}" + "".join(f"{size:>9g}" for size in sizes))
     for name in ("sc8", "n25_s1", "n54_s1", "n200_s1"):
         packing = stored(name)
-        place, room = widest_pore(packing)
+        (place,), (room,) = widest_pores(packing, 1)
         for model in MODELS[1:]:
             before = PoreFlow(packing, walls_of("no_slip"), conductance=model).permeability
             changes = []
             for size in sizes:
-                radii = np.append(packing.radii, size * room)
-                more = Packing(np.vstack([packing.centres, place]), radii, packing.box)
+                more = with_grain(packing, place, size * room)
                 changes.append(PoreFlow(more, walls_of("no_slip"), conductance=model).permeability / before - 1.0)
             print(f"{name:10}{model.name:22}" + "".join(f"{100 * change:+8.2f}%" for change in changes))
     if out is None:
@@ -464,16 +464,6 @@ def limits(out: Path | None) -> None:
     axis.yaxis.set_minor_formatter("")
     axis.legend()
     figure.savefig(out / "accuracy_lattices.png", dpi=110)
-
-
-def widest_pore(packing: Packing) -> tuple[np.ndarray, float]:
-    """The Laguerre vertex furthest from all spheres and walls, and how far."""
-    places = PoreMesh(packing).vertices
-    places = places[((places > 0) & (places < 1)).all(axis=1)]
-    gaps = np.minimum(places, 1 - places).min(axis=1)
-    for centre, radius in zip(packing.centres, packing.radii, strict=True):
-        gaps = np.minimum(gaps, np.linalg.norm(places - centre, axis=1) - radius)
-    return places[gaps.argmax()], float(gaps.max())
 
 
 # ---- fit --------------------------------------------------------------------------------------------------------

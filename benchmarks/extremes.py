@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from scale import PACKINGS, TILES, mirrored
+from voids import widest_pores, with_grain
 
 from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, SectionFriction, Wall, Walls
 from porefv.approximate_cholesky import ApproximateCholesky
@@ -414,25 +415,14 @@ def one_more_grain(name: str, sizes: np.ndarray, pores: int = 1) -> dict[str, np
     """
     packing = stored(name)
     mesh = PoreMesh(packing)
-    inside = ((mesh.vertices > packing.box.lower) & (mesh.vertices < packing.box.upper)).all(axis=1)
-    places = mesh.vertices[inside]
-    gaps = np.min(
-        [np.linalg.norm(places - c, axis=1) - r for c, r in zip(packing.centres, packing.radii, strict=True)], 0
-    )
-    gaps = np.minimum(gaps, np.minimum(places - packing.box.lower, packing.box.upper - places).min(axis=1))
-    widest: list[int] = []
-    for k in np.argsort(-gaps, kind="stable"):
-        if len(widest) < pores and all(np.linalg.norm(places[k] - places[other]) > 0.5 * gaps[k] for other in widest):
-            widest.append(k)
+    places, room = widest_pores(packing, pores)
     found = {}
     for model in MODELS.values():
         before = PoreFlow(mesh, Walls.along("y"), Fluid(1.0), model()).permeability
-        changes = np.empty((len(widest), len(sizes)))
-        for row, k in enumerate(widest):
-            for column, size in enumerate(sizes):
-                centres, radii = np.vstack([packing.centres, places[k]]), np.append(packing.radii, size * gaps[k])
-                flow = PoreFlow(Packing(centres, radii, packing.box), Walls.along("y"), Fluid(1.0), model())
-                changes[row, column] = flow.permeability / before
+        changes = np.empty((len(places), len(sizes)))
+        for row, column in np.ndindex(changes.shape):
+            more = with_grain(packing, places[row], sizes[column] * room[row])
+            changes[row, column] = PoreFlow(more, Walls.along("y"), Fluid(1.0), model()).permeability / before
         found[model.name] = changes
     return found
 

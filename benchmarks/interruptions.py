@@ -19,17 +19,7 @@ from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-PACKING = Path(__file__).resolve().parents[1] / "data" / "packings" / "n2000_s1.csv"
-SCENE = """
-packing = "{packing}"
-[walls]
-y_min = {{ pressure = 1.0 }}
-y_max = {{ pressure = 0.0 }}
-[output]
-directory = "results"
-quantities = ["permeability", "pressure", "forces"]
-vtk = true
-"""
+DATA = Path(__file__).resolve().parents[1] / "data"
 ENDS = {0: "done", 130: "interrupted, in a line", -signal.SIGINT: "interrupted as Python starts or ends"}
 
 
@@ -67,7 +57,9 @@ def main() -> None:
     counts: Counter[tuple[str, str]] = Counter()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "scene.toml").write_text(SCENE.format(packing=PACKING), encoding="utf-8")
+        scene = (DATA / "scenes" / "n2000.toml").read_text(encoding="utf-8")
+        scene = scene.replace("../packings", str(DATA / "packings")).replace("results/n2000", "results")
+        (folder / "scene.toml").write_text(scene, encoding="utf-8")
         for _ in range(2):  # the first may compile
             begin = time.perf_counter()
             start(folder).communicate()

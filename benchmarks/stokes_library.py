@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from voids import widest_pores, with_grain
 
 from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
 from porefv.dem import Material
@@ -102,12 +103,8 @@ def with_fines(number: int, smaller: float, seed: int) -> Packing:
 def one_more(name: str, part: float) -> Packing:
     """A packing, and in the widest of its pores a grain of a part of the radius that fits there."""
     packing = stored(name)
-    vertices = PoreMesh(packing).vertices
-    gaps = [np.min(np.linalg.norm(packing.centres - x, axis=1) - packing.radii) for x in vertices]
-    walls = np.minimum(vertices, 1.0 - vertices).min(axis=1)
-    room = np.minimum(gaps, walls)
-    widest = int(room.argmax())
-    return Packing(np.vstack([packing.centres, vertices[widest]]), np.append(packing.radii, part * room[widest]), UNIT)
+    (place,), (room,) = widest_pores(packing, 1)
+    return with_grain(packing, place, part * room)
 
 
 def cases() -> dict[str, Callable[[], Packing]]:
