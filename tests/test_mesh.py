@@ -153,6 +153,14 @@ def test_uniting_hardly_changes_the_permeability_and_keeps_volume(reference, mes
     assert_allclose(np.bincount(united.cell_pore, apart.cell_void_volumes), united.pore_volumes, rtol=1e-13)
 
 
+@pytest.mark.parametrize("name", ["n54_s1", "n200_s1"])
+def test_uniting_hardly_changes_forces(reference, mesh_of, unit_flow, name):
+    # Throats that vanish draw no centres of pores, and so leave nothing to jump.
+    apart = unit_flow(PoreMesh(reference(name), unite_tolerance=0.0), Walls.along("y")).forces.total
+    change = unit_flow(mesh_of(name), Walls.along("y")).forces.total - apart
+    assert np.abs(change).max() < 4e-3 * np.abs(apart[:, 1]).mean()
+
+
 def test_pores_are_numbered_without_gaps(mesh_of):
     mesh = mesh_of("n2000_s1")
     np.testing.assert_array_equal(np.unique(mesh.cell_pore), np.arange(mesh.n_pores))

@@ -15,24 +15,29 @@ from porefv.kernels import njit, prange
 
 # How far a vanishing sphere draws the centre, as a part of its height over the neck.
 DRAWN = 0.5
+# Throats shorter than this part of their neck's least radius ask for less, and for nothing as they vanish.
+SHORT = 0.1
 
 
 @njit(cache=True)
 def drawn_parts(
     facets, starts, facet_cells, facet_vertices, cells, order, firsts, pores, n, points, sizes, vertices, normals,
-    parts,
+    lengths, parts,
 ):  # fmt: skip
     """Parts (m, 4) of the way from a pore's vertex to each sphere of its cells by which that sphere draws the centre.
 
     A throat asks that the centre be at (1 - r / r_n) / 2 of the height H that the sphere of radius r has over the
     throat's plane at least, r_n being the least of the neck's radii: at a half for specks, anywhere for equal spheres.
     The part is the largest of those that the pore's throats ask for. A sphere that reaches into the neck, H < r, draws
-    by H / r of it, and so not at all as it comes into the plane.
+    by H / r of it, and so not at all as it comes into the plane. A throat shorter than `SHORT` r_n asks for less, in
+    proportion, so that nothing jumps where throats vanish.
 
     Parameters
     ----------
     facets, starts : arrays
         Of `Throats.facets_of_throats`.
+    lengths : (t,) array
+        Of throats.
     order, firsts : (m,), (n_pores + 1,) arrays
         Cells in the order of their pores, and where those of each pore begin.
     """
@@ -46,6 +51,7 @@ def drawn_parts(
                 k = facet_vertices[facets[j], v]
                 if k < n:
                     least = min(least, sizes[k])
+        asks = min(lengths[t] / (SHORT * least), 1.0)
         for side in range(2):
             inward = 1.0 if side == 1 else -1.0
             height = inward * _dot(_minus(_at(facet_cells[f, side], vertices), first), normal)
@@ -58,7 +64,7 @@ def drawn_parts(
                     above = inward * _dot(_minus(_at(k, points), first), normal)
                     wanted = DRAWN * (1.0 - sizes[k] / least) * above
                     if above > 0.0 and height < wanted:
-                        part = min(above / sizes[k], 1.0) * (wanted - height) / (above - height)
+                        part = asks * min(above / sizes[k], 1.0) * (wanted - height) / (above - height)
                         parts[c, i] = max(parts[c, i], part)
 
 

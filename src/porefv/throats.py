@@ -164,7 +164,8 @@ class Throats:
         parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
         drawn_parts(
             facets, starts, mesh.facet_cells, mesh.facet_vertices, mesh.cells, order, firsts, mesh.cell_pore,
-            mesh.n_spheres, mesh.local_points, mesh.sizes, mesh.local_vertices, self.facet_normals, parts,
+            mesh.n_spheres, mesh.local_points, mesh.sizes, mesh.local_vertices, self.facet_normals,
+            self.effective_lengths, parts,
         )  # fmt: skip
         pore_centres(mesh.cells, order, firsts, mesh.n_spheres, mesh.local_points, mesh.local_vertices, parts, centres)
         return centres
