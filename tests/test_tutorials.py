@@ -35,7 +35,7 @@ def test_forces_from_a_packing_file_to_a_picture(tmp_path):
     assert permeability == pytest.approx(6.4492e-6, rel=1e-4)
     assert abs(void) < 1e-12
     assert residual < 1e-12
-    assert total == pytest.approx([-0.01036, 0.98125, -0.00207], abs=1e-5)
+    assert total == pytest.approx([-0.01038, 0.98125, -0.00214], abs=1e-5)
     assert [a + b for a, b in zip(total, walls, strict=True)] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
     assert ratio == pytest.approx(1.0, abs=0.05)
     assert strongest == 12
