@@ -70,7 +70,11 @@ def conjugate_gradients(
 
 def _iterate(a, rhs, preconditioner, tolerance, guess):
     x = np.zeros(len(a)) if guess is None else guess.copy()
-    z, ap, room = np.empty((3, len(a)))
+
+    def enough():
+        flow, floor = _measures(a, rhs, x)
+        return 0.5 * max(tolerance * flow, floor)
+
     iterations = 0
     before = np.inf
     while True:
@@ -81,23 +85,32 @@ def _iterate(a, rhs, preconditioner, tolerance, guess):
         if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= _MAX_ITERATIONS:
             return x, iterations
         before = lost
-        rz = preconditioner.apply(r, z, room)
-        p = z.copy()
-        enough = 0.0
-        while iterations < _MAX_ITERATIONS:
-            iterations += 1
-            alpha = rz / _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
-            lost = _advance(x, r, p, ap, alpha)
-            if iterations % _LOOK_EVERY == 0:
-                flow, floor = _measures(a, rhs, x)
-                enough = 0.5 * max(tolerance * flow, floor)
-            if lost <= enough:
-                break
-            new = preconditioner.apply(r, z, room)
-            if not new > 0.0:
-                break
-            _redirect(p, z, new / rz)
-            rz = new
+        iterations += _descend(a, x, r, preconditioner, 0.0, enough, _MAX_ITERATIONS - iterations)
+
+
+def _descend(a, x, r, preconditioner, least, enough, limit):
+    """Iterate on x, whose residual is r, until Σ|r| is below `least` or what is `enough` now; returns how often."""
+    z, ap, room = np.empty((3, len(a)))
+    rz = preconditioner.apply(r, z, room)
+    p = z.copy()
+    target = least
+    iterations = 0
+    while iterations < limit:
+        iterations += 1
+        power = _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
+        if not power > 0.0:  # what is left is no number any more, or the factor is spoilt
+            break
+        lost = _advance(x, r, p, ap, rz / power)
+        if iterations % _LOOK_EVERY == 0:
+            target = max(least, enough())
+        if lost <= target:
+            break
+        new = preconditioner.apply(r, z, room)
+        if not new > 0.0:
+            break
+        _redirect(p, z, new / rz)
+        rz = new
+    return iterations
 
 
 @dataclass(frozen=True)
@@ -192,30 +205,13 @@ def _largest_error(preconditioner: Preconditioner, r: np.ndarray) -> float:
 def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
     """What to add to the pressures, from their residual r: to the tolerance, or as far as one residual reaches."""
     d = np.zeros(len(a))
-    z, ap, room = np.empty((3, len(a)))
-    r = r.copy()
-    rz = preconditioner.apply(r, z, room)
-    p = z.copy()
+
+    def enough():
+        flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
+        return 0.5 * tolerance * flow
+
     least = _REACH * float(np.abs(r).sum())
-    enough = least
-    iterations = 0
-    while iterations < _MAX_ITERATIONS:
-        iterations += 1
-        power = _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
-        if not power > 0.0:  # what is left is no number any more, or the factor is spoilt
-            break
-        lost = _advance(d, r, p, ap, rz / power)
-        if iterations % _LOOK_EVERY == 0:
-            flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
-            enough = max(least, 0.5 * tolerance * flow)
-        if lost <= enough:
-            break
-        new = preconditioner.apply(r, z, room)
-        if not new > 0.0:
-            break
-        _redirect(p, z, new / rz)
-        rz = new
-    return d, iterations
+    return d, _descend(a, d, r.copy(), preconditioner, least, enough, _MAX_ITERATIONS)
 
 
 @njit(cache=True, parallel=True)
