@@ -4,6 +4,7 @@ python benchmarks/accuracy.py cases      # permeability and forces of every case
 python benchmarks/accuracy.py throats    # throat by throat, by kind
 python benchmarks/accuracy.py paper      # Chareyre et al. (2012): figures 9 to 12, table 2
 python benchmarks/accuracy.py limits     # cubic lattices; one more grain
+python benchmarks/accuracy.py large      # the inside of large packings beside Carman-Kozeny
 python benchmarks/accuracy.py fit        # the constants of SectionFriction
 python benchmarks/accuracy.py cost       # C12's table 1
 python benchmarks/accuracy.py all --out docs/img    # draws the figures, too
@@ -466,6 +467,45 @@ def limits(out: Path | None) -> None:
     figure.savefig(out / "accuracy_lattices.png", dpi=110)
 
 
+# ---- large packings ---------------------------------------------------------------------------------------------
+
+
+def large(out: Path | None) -> None:
+    """Interior throats of dense packings beside the resolved; the inside of large ones beside Carman and Kozeny."""
+    for case in library():
+        if case.name.startswith(("n54_s1", "press_n30_r1")):
+            spent, resolved, *found = throats_of(case, 0, 0).T
+            ratios = "  ".join(
+                f"{model.name} {np.exp(spent @ np.log(k / resolved) / spent.sum()):.3f}"
+                for model, k in zip(MODELS, found, strict=True)
+            )
+            print(f"{case.name:26} {len(spent)} interior throats, K over the resolved: {ratios}")
+    print(f"{'':12}{'porosity':>10}{'inside':>9}" + "".join(f"{model.name:>18}" for model in MODELS))
+    for name in ("n2000_s1", "n5000_s1", "n20000_s1"):
+        mesh = PoreMesh(stored(name))
+        found = [inside(PoreFlow(mesh, walls_of("symmetry"), Fluid(1.0), model)) for model in MODELS]
+        radii = mesh.packing.radii
+        porosity = found[0][0]
+        diameter = 2.0 * (radii**3).sum() / (radii**2).sum()
+        usual = diameter**2 * porosity**3 / (180.0 * (1.0 - porosity) ** 2)
+        line = "".join(f"{permeability / usual:18.3f}" for _, permeability in found)
+        print(f"{name:12}{mesh.packing.porosity:10.3f}{porosity:9.3f}{line}")
+
+
+def inside(flow: PoreFlow) -> tuple[float, float]:
+    """Porosity and permeability along y away from all walls, in the middle 0.6 of each side: flux over gradient."""
+    mesh = flow.mesh
+    places = (mesh.vertices - mesh.box.lower) / mesh.box.size
+    chosen = ((places > 0.2) & (places < 0.8)).all(axis=1)
+    volumes, voids = mesh.cell_volumes[chosen], mesh.cell_void_volumes[chosen]
+    pores = mesh.cell_pore[chosen]
+    flux = voids @ flow.pore_velocity[pores, 1] / volumes.sum()
+    weight = np.sqrt(volumes)[:, None]
+    linear = np.column_stack([mesh.vertices[chosen], np.ones(len(pores))])
+    gradient = np.linalg.lstsq(weight * linear, weight[:, 0] * flow.pressure[pores], rcond=None)[0][1]
+    return float(voids.sum() / volumes.sum()), float(-flux / gradient)
+
+
 # ---- fit --------------------------------------------------------------------------------------------------------
 
 
@@ -529,6 +569,7 @@ PARTS = {
     "forces": forces,
     "paper": paper,
     "limits": limits,
+    "large": large,
     "fit": fit,
     "cost": cost,
 }
