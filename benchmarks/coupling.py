@@ -3,8 +3,8 @@
     python benchmarks/coupling.py cost --store consolidation [--grains 5000]
     python benchmarks/coupling.py stability --store consolidation [--grains 500]
 
-`--store` holds samples as `benchmarks/consolidation.py` makes them. Conductances are by
-the hydraulic radius. CPU time of one thread, the least of several runs.
+`--store` holds samples as `benchmarks/consolidation.py` makes them. CPU time of one thread, the
+least of several runs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
 import porefv.coupling.coupled as coupled
-from porefv import ComputationError, Fluid, HydraulicRadius
+from porefv import ComputationError, Fluid
 from porefv.coupling import Coupling
 from porefv.dem import Plate
 
@@ -104,7 +104,7 @@ def yade(dem, viscosity: float) -> list[float] | None:
 def cost(grains: int, store: Path) -> None:
     dry = loaded(grains, store)
     dry.run(20)
-    coupling = Coupling(loaded(grains, store), DRAINED, Fluid(viscosity=VISCOSITY), HydraulicRadius())
+    coupling = Coupling(loaded(grains, store), DRAINED, Fluid(viscosity=VISCOSITY))
     coupling.run(100)
     effort = coupling.effort
     effort.seconds = dict.fromkeys(effort.seconds, 0.0)
@@ -133,7 +133,7 @@ def bounded(grains: int, store: Path, scheme: str, viscosity: float, part: float
     """Whether 200 steps of so much of the critical dry step stay within bounds."""
     dem = loaded(grains, store)
     dem.step = part * dem.critical_step
-    coupling = Coupling(dem, DRAINED, Fluid(viscosity=viscosity), HydraulicRadius(), scheme=scheme)
+    coupling = Coupling(dem, DRAINED, Fluid(viscosity=viscosity), scheme=scheme)
     most = 0.0
     try:
         for _ in range(10):
@@ -165,7 +165,7 @@ def stability(grains: int, store: Path) -> None:
                     low, high = (middle, high) if bounded(grains, store, scheme, viscosity, middle) else (low, middle)
             largest[scheme] = low
         fluid = Fluid(viscosity=viscosity)
-        probe = Coupling(loaded(grains, store), DRAINED, fluid, HydraulicRadius(), scheme="semi-implicit")
+        probe = Coupling(loaded(grains, store), DRAINED, fluid, scheme="semi-implicit")
         shown = [f"{'≥ ' if part >= 0.85 else ''}{part:.2g}" for part in largest.values()]
         print(f"| {viscosity:g} | {shown[0]} | {shown[1]} | {probe.drag_number:.2g} |", flush=True)
 

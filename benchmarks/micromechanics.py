@@ -2,8 +2,7 @@
 
 The oedometer of benchmarks/consolidation.py, looked at from within: at some time factors, layer by layer, the fluid's
 pressure, the increment of the grains' stress, and their strain since the load came. Beside the strain is that of the
-same layer of the dry sample at the same stress: it is loaded in steps, slowly, from rest to rest. Conductances are by
-the hydraulic radius.
+same layer of the dry sample at the same stress: it is loaded in steps, slowly, from rest to rest.
 
     python benchmarks/micromechanics.py --grains 2000 --out docs/img/micromechanics.png
 """
@@ -17,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, permeability, sample
 
-from porefv import Fluid, HydraulicRadius, PoreMesh
+from porefv import Fluid, PoreMesh
+from porefv.conductance import AUTO
 from porefv.coupling import Coupling
 from porefv.dem import DEM, Plate
 from porefv.poromechanics import grain_strains, grain_stresses, layer_means, terzaghi_pressure
@@ -104,9 +104,9 @@ def main() -> None:
     dem = sample(options.grains, options.store)
     dem.damping = 0.0
     dem.set_plates({"z_max": Plate(stress=options.stress, top_speed=0.5)})
-    coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY), HydraulicRadius())
+    coupling = Coupling(dem, DRAINED, Fluid(viscosity=VISCOSITY))
     half = 0.5 * (start.edges[-1] - start.edges[0])
-    unit = half**2 * VISCOSITY / (permeability(start.mesh.packing)["taps"] * modulus)
+    unit = half**2 * VISCOSITY / (permeability(start.mesh.packing, AUTO())["taps"] * modulus)
     rows = {}
     for moment in sorted({*options.times, options.shown}):
         coupling.run(max(round(moment * unit / dem.step) - coupling.effort.steps, 0))
