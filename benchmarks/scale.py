@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("spheres", nargs="*", type=int, default=list(TILES), help=f"of {', '.join(map(str, TILES))}")
     parser.add_argument("--out", type=Path, help="write a log-log plot here")
     parser.add_argument("--yade-limit", type=int, default=160_000, help="largest packing given to Yade; 0: none")
-    parser.add_argument("--conductance", default="hydraulic-radius", help="the default is Yade's model")
+    parser.add_argument("--conductance", default="auto", help="hydraulic-radius is Yade's model")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:

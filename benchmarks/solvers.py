@@ -14,7 +14,7 @@ import time
 import numpy as np
 from scale import TILES, mirrored
 
-from porefv import ComputationError, Fluid, HydraulicRadius, PoreFlow, Walls
+from porefv import ComputationError, Fluid, PoreFlow, Walls
 from porefv.conjugate_gradients import imbalance
 from porefv.network import Network
 from porefv.pressure import free_network, reached
@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def network(spheres: int, decades: float = 0.0) -> tuple[Network, np.ndarray]:
-    flow = PoreFlow(mirrored(spheres), Walls.along("y"), Fluid(1.0), HydraulicRadius())
+    flow = PoreFlow(mirrored(spheres), Walls.along("y"), Fluid(1.0))
     spread = 10.0 ** -np.random.default_rng(0).uniform(0.0, decades, len(flow.conductances))
     pairs, conductances, held = flow.mesh.throats.pores, flow.conductances * spread, flow.imposed_pressures
     free = np.isnan(held)
