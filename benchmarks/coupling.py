@@ -3,7 +3,8 @@
     python benchmarks/coupling.py cost --store consolidation [--grains 5000]
     python benchmarks/coupling.py stability --store consolidation [--grains 500]
 
-`--store` holds samples as `benchmarks/consolidation.py` makes them. CPU time is of one thread, the least of several runs.
+`--store` holds samples as `benchmarks/consolidation.py` makes them. CPU time is of one thread, the least
+of several runs.
 """
 
 from __future__ import annotations

@@ -160,6 +160,13 @@ def test_bad_input_is_status_2_and_no_traceback(arguments, tmp_path):
     assert done.stdout == ""
 
 
+def test_an_unknown_option_is_refused_with_the_usage_of_its_command(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["plot", "results", "--out", "picture.png", "--force"])
+    error = capsys.readouterr().err
+    assert error.startswith("usage: porefv plot ") and "porefv plot: error: unrecognized arguments: --force" in error
+
+
 def test_errors_name_file_and_line(scene):
     scene.write_text(scene.read_text().replace("[walls]", "[fluid]\nviscosity = 0\n[walls]"))
     done = run("solve", scene.name, cwd=scene.parent)

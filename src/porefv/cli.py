@@ -67,6 +67,16 @@ def _fail(message: str, status: int) -> int:
     return status
 
 
+class _CommandParser(argparse.ArgumentParser):
+    """The parser of one command, which refuses what it does not know itself, with its own usage."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return known, unknown
+
+
 def _parser() -> argparse.ArgumentParser:
     from porefv.reference import command as reference
     from porefv.simulation import command as simulation
@@ -79,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
         "Exit status: 0 done, 1 the computation failed, 2 bad input.",
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_CommandParser)
 
     pack = commands.add_parser("pack", help="make a packing of spheres, and write its file")
     _add_run_options(pack, force="replace a file that exists")
