@@ -197,6 +197,18 @@ def _corners(f, facet_vertices, n, points):
     return a, b, c, ab, ac, cross, np.sqrt(_dot(cross, cross))
 
 
+@njit(cache=True)
+def _angles(b, c, n, ab, ac, twice):
+    """Angles of a facet at its vertices, 0 at walls: b and c are its second and third, the rest as of `_corners`."""
+    if b >= n:
+        return 0.5 * np.pi, 0.0, 0.0
+    at_a = np.arctan2(twice, _dot(ab, ac))
+    if c >= n:
+        return at_a, np.pi - at_a, 0.0
+    at_b = np.arctan2(twice, _dot(_minus(ab, ac), ab))
+    return at_a, at_b, np.pi - at_a - at_b
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, normals, lengths, fluid, sectors, covered):
     """Unit normal, L = (P_j - P_i)·n, A^f, sector areas A^k of each facet, and whether its spheres cover it.
@@ -207,30 +219,22 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
         a, b, c, ab, ac, cross, twice = _corners(f, facet_vertices, n, points)
         normal = _times(1.0 / twice if twice > 0.0 else 0.0, cross)
         ra = sizes[a]
+        angles = _angles(b, c, n, ab, ac, twice)
+        sectors[f, 0] = 0.5 * angles[0] * ra * ra
+        sectors[f, 1] = 0.5 * angles[1] * sizes[b] * sizes[b]
+        sectors[f, 2] = 0.5 * angles[2] * sizes[c] * sizes[c]
         if c < n:
             area = 0.5 * twice
-            angle_a = np.arctan2(twice, _dot(ab, ac))
-            angle_b = np.arctan2(twice, _dot(_minus(ab, ac), ab))
-            sectors[f, 0] = 0.5 * angle_a * ra * ra
-            sectors[f, 1] = 0.5 * angle_b * sizes[b] * sizes[b]
-            sectors[f, 2] = 0.5 * (np.pi - angle_a - angle_b) * sizes[c] * sizes[c]
             _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
             _cut_sectors(f, 1, 2, b, c, _minus(ac, ab), n, points, sizes, sectors)
             _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
         elif b < n:
             area = 0.5 * (_height(a, c, points, sizes) + _height(b, c, points, sizes)) * twice
-            angle_a = np.arctan2(twice, _dot(ab, ac))
-            sectors[f, 0] = 0.5 * angle_a * ra * ra
-            sectors[f, 1] = 0.5 * (np.pi - angle_a) * sizes[b] * sizes[b]
-            sectors[f, 2] = 0.0
             _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
             _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
             _cut_sectors(f, 1, 2, b, c, ac, n, points, sizes, sectors)
         else:
             area = _height(a, b, points, sizes) * _height(a, c, points, sizes)
-            sectors[f, 0] = 0.25 * np.pi * ra * ra
-            sectors[f, 1] = 0.0
-            sectors[f, 2] = 0.0
             _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
             _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
         fluid[f] = area - (sectors[f, 0] + sectors[f, 1] + sectors[f, 2])

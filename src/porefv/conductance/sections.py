@@ -13,7 +13,7 @@ import numpy as np
 
 from porefv.boundary import LEAST, MOST, within_range
 from porefv.errors import InputError
-from porefv.facets import _at, _cross, _dot, _height, _minus, _towards
+from porefv.facets import _angles, _at, _corners, _dot, _height, _minus
 from porefv.kernels import njit, prange
 from porefv.throats import Throats
 
@@ -158,28 +158,17 @@ def _span(f, facet_cells, facet_vertices, points, ends, normals, length):
 @njit(cache=True)
 def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
     """Radii of the spheres of facet f and its angles there; returns the length of its edges on no-slip walls."""
-    a = facet_vertices[f, 0]
-    b = facet_vertices[f, 1]
-    c = facet_vertices[f, 2]
+    a, b, c, ab, ac, _, twice = _corners(f, facet_vertices, n, points)
+    angles[0], angles[1], angles[2] = _angles(b, c, n, ab, ac, twice)
     radii[0] = sizes[a]
-    if b >= n:
-        angles[0] = 0.5 * np.pi
-        on_b = 0.0 if slip[b - n] else _height(a, c, points, sizes)
-        on_c = 0.0 if slip[c - n] else _height(a, b, points, sizes)
-        return on_b + on_c
-    ab = _towards(a, b, n, points)
-    ac = _towards(a, c, n, points)
-    cross = _cross(ab, ac)
-    twice = np.sqrt(_dot(cross, cross))
-    angles[0] = np.arctan2(twice, _dot(ab, ac))
-    radii[1] = sizes[b]
-    if c >= n:
-        angles[1] = np.pi - angles[0]
-        return 0.0 if slip[c - n] else twice
-    angles[1] = np.arctan2(twice, _dot(_minus(ab, ac), ab))
-    radii[2] = sizes[c]
-    angles[2] = np.pi - angles[0] - angles[1]
-    return 0.0
+    if b < n:
+        radii[1] = sizes[b]
+    if c < n:
+        radii[2] = sizes[c]
+        return 0.0
+    on_c = 0.0 if slip[c - n] else (twice if b < n else _height(a, b, points, sizes))
+    on_b = 0.0 if b < n or slip[b - n] else _height(a, c, points, sizes)
+    return on_b + on_c
 
 
 @njit(cache=True, error_model="numpy")
