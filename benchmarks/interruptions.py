@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -65,10 +66,7 @@ def main() -> None:
             start(folder).communicate()
             whole = time.perf_counter() - begin
         for _ in range(options.times):
-            if (folder / "results").exists():
-                for path in (folder / "results").iterdir():
-                    path.unlink()
-                (folder / "results").rmdir()
+            shutil.rmtree(folder / "results", ignore_errors=True)
             counts[interrupted(folder, moments.uniform(0.0, whole))] += 1
     print(f"{options.times} runs of {whole:.1f} s, interrupted")
     for (end, left), count in counts.most_common():

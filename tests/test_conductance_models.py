@@ -76,7 +76,7 @@ def test_flow_through_random_packings(reference, values, unit_flow, name, kind):
     assert_allclose(flow.permeability, fem["K"], rtol=0.01)
     error, papers = (np.linalg.norm(found.forces.total - exact) / np.linalg.norm(exact) for found in (flow, paper))
     assert error < 0.045  # 3.8 to 4.1 %
-    assert error < 0.65 * papers  # 6.9 to 13.2 %
+    assert error < 0.61 * papers  # 6.9 to 13.2 %
 
 
 @pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "sc8", "bcc9", "nine_0.4"])
@@ -128,7 +128,7 @@ def test_it_is_closer_than_the_papers_model_in_every_case(path):
         for model in (AUTO(), HydraulicRadius())
     )
     if path.stem == "press_n18_r8_s25_no_slip":  # the one of 101: +7.9 %, and -6.9 % by the hydraulic radius
-        papers *= 1.2
+        papers *= 1.16
     assert abs(found) < abs(papers)
     # Fines adrift in a channel are the worst; 12 % in a cloud of porosity 0.85, 9 % else.
     assert abs(found) < (0.35 if path.stem.startswith("fines") else 0.15)

@@ -225,18 +225,14 @@ def facet_sections(facet_cells, facet_vertices, vertices, n, points, sizes, norm
         sectors[f, 2] = 0.5 * angles[2] * sizes[c] * sizes[c]
         if c < n:
             area = 0.5 * twice
-            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
-            _cut_sectors(f, 1, 2, b, c, _minus(ac, ab), n, points, sizes, sectors)
-            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
         elif b < n:
             area = 0.5 * (_height(a, c, points, sizes) + _height(b, c, points, sizes)) * twice
-            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
-            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
-            _cut_sectors(f, 1, 2, b, c, ac, n, points, sizes, sectors)
         else:
             area = _height(a, b, points, sizes) * _height(a, c, points, sizes)
-            _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
-            _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
+        _cut_sectors(f, 0, 1, a, b, ab, n, points, sizes, sectors)
+        if b < n:
+            _cut_sectors(f, 1, 2, b, c, _minus(ac, ab) if c < n else ac, n, points, sizes, sectors)
+        _cut_sectors(f, 0, 2, a, c, ac, n, points, sizes, sectors)
         fluid[f] = area - (sectors[f, 0] + sectors[f, 1] + sectors[f, 2])
         pi = _at(facet_cells[f, 0], vertices)
         lengths[f] = _dot(normal, _minus(_at(facet_cells[f, 1], vertices), pi))
