@@ -87,13 +87,14 @@ def dem_run() -> dict[str, np.ndarray]:
 def coupled_run(scheme: str) -> dict[str, np.ndarray]:
     """200 grains pressed by a plate, drained at the top."""
     dem = DEM(Packing.read(PACKINGS / "n200_s1.csv"), Material(), plates(), step=1e-5)
-    coupling = Coupling(dem, Walls(z_max=Wall(pressure=0.0)), scheme=scheme)
+    coupling = Coupling(dem, Walls(z_max=Wall(pressure=0.0)), scheme=scheme, renewal=1e-4)
     coupling.run(200)
     state = grain_state(dem) | {
         "pressure": coupling.pressure,
         "fluid_forces": coupling.fluid_forces,
         "wall_fluid_forces": coupling.wall_fluid_forces,
         "iterations": np.array(coupling.effort.iterations),
+        "meshes": np.array(coupling.effort.meshes),
     }
     return {f"{scheme}/{name}": array for name, array in state.items()}
 
