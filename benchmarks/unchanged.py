@@ -86,8 +86,8 @@ def dem_run() -> dict[str, np.ndarray]:
 
 def coupled_run(scheme: str) -> dict[str, np.ndarray]:
     """200 grains pressed by a plate, drained at the top."""
-    dem = DEM(Packing.read(PACKINGS / "n200_s1.csv"), Material(), plates(), step=1e-5)
-    coupling = Coupling(dem, Walls(z_max=Wall(pressure=0.0)), scheme=scheme, renewal=1e-4)
+    dem = DEM(Packing.read(PACKINGS / "n200_s1.csv"), Material(), plates())
+    coupling = Coupling(dem, Walls(z_max=Wall(pressure=0.0)), scheme=scheme, renewal=5e-4)
     coupling.run(200)
     state = grain_state(dem) | {
         "pressure": coupling.pressure,
