@@ -24,8 +24,8 @@ from voids import widest_pores, with_grain
 
 from porefv import Box, EffectiveRadius, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
 from porefv.conductance import ConductanceModel, SectionFriction
-from porefv.forces import facet_forces
-from porefv.reference import StokesReference
+from porefv.flow.forces import facet_forces
+from porefv.resolved import StokesReference
 
 DATA = Path(__file__).parent.parent / "data"
 MODELS = (EffectiveRadius(), HydraulicRadius(), SectionFriction())
@@ -107,12 +107,12 @@ class Case:
         """(t,): throats of which no end has been drawn from its Laguerre vertex, where pressures were resolved."""
         throats = self.mesh.throats
         drawn = np.abs(throats.centres - self.mesh.local_vertices).max(axis=1) > 0.0
-        return ~drawn[self.mesh.facet_cells[throats.first_facets]].any(axis=1)
+        return ~drawn[self.mesh.facets.cells[throats.first_facets]].any(axis=1)
 
     @cached_property
     def walls_of_throats(self) -> np.ndarray:
         """(t,): on how many walls each throat is: 0 interior, 1 wall, 2 edge of the box."""
-        return (self.mesh.facet_vertices[self.mesh.throats.first_facets] >= self.mesh.n_spheres).sum(axis=1)
+        return (self.mesh.facets.vertices[self.mesh.throats.first_facets] >= self.mesh.n_spheres).sum(axis=1)
 
 
 MARKS = {"fitted": "*", "known": " ", "blind": "b"}
@@ -317,9 +317,9 @@ def forces(out: Path | None) -> None:
             computed = flow.acting_pressure
             for pressure in (computed, at_vertex, mean):
                 of_cell = np.where(np.isnan(held), pressure, held)[mesh.cell_pore]
-                drops = of_cell[mesh.facet_cells[:, 0]] - of_cell[mesh.facet_cells[:, 1]]
+                drops = of_cell[mesh.facets.cells[:, 0]] - of_cell[mesh.facets.cells[:, 1]]
                 total = np.zeros((mesh.n_spheres + 6, 3))
-                np.add.at(total, mesh.facet_vertices, unit * drops[:, None, None])
+                np.add.at(total, mesh.facets.vertices, unit * drops[:, None, None])
                 line += f"{100 * relative_rms(total[: mesh.n_spheres], exact):11.1f}%"
                 if pressure is computed and not reference.walls.slip.any():
                     # The thrust is 1: what spheres do not take along the flow, walls do.
@@ -549,7 +549,7 @@ def cost(out: Path | None) -> None:
     print(f"{len(throats)} throats, conductances:", end=" ")
     for model in MODELS:
         throats = PoreMesh(packing).throats
-        _ = throats.facet_sectors
+        _ = mesh.facets.sectors
         before = process_time()
         model.conductivity(throats, slip)
         print(f"{model.name} {process_time() - before:.2f} s", end="  ")

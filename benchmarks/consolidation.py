@@ -24,10 +24,10 @@ import numpy as np
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
 from porefv.conductance import AUTO, MODELS, ConductanceModel
 from porefv.coupling import Coupling
-from porefv.coupling.ends import permeameter
+from porefv.coupling.end_correction import permeameter
 from porefv.dem import DEM, Material, Plate, UniformSizes, checkpoint, grow
-from porefv.flow import throat_conductances
-from porefv.poromechanics import terzaghi_pressure, terzaghi_settlement
+from porefv.flow.pore_flow import throat_conductances
+from porefv.coupling.consolidation import terzaghi_pressure, terzaghi_settlement
 
 SIDE, CONFINEMENT, VISCOSITY = 0.66, 5e3, 250.0
 MATERIAL = Material(young=15e6, stiffness_ratio=0.5, friction_angle=30.0, density=2600.0)

@@ -23,7 +23,7 @@ os.environ["NUMBA_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
-import porefv.coupling.coupled as coupled
+import porefv.coupling.coupling as coupled
 from porefv import ComputationError, Fluid
 from porefv.coupling import Coupling
 from porefv.dem import Plate

@@ -19,12 +19,12 @@ from scale import PACKINGS, TILES, mirrored
 from voids import widest_pores, with_grain
 
 from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, SectionFriction, Wall, Walls
-from porefv.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
 from porefv.conductance import AUTO, MODELS
-from porefv.conjugate_gradients import refined
+from porefv.solvers.conjugate_gradients import refined
 from porefv.errors import PorefvError
-from porefv.network import Network
-from porefv.pressure import free_network
+from porefv.solvers.network import Network
+from porefv.solvers.pressure_equation import free_network
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"

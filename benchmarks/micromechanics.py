@@ -20,7 +20,7 @@ from porefv import Fluid, PoreMesh
 from porefv.conductance import AUTO
 from porefv.coupling import Coupling
 from porefv.dem import DEM, Plate
-from porefv.poromechanics import grain_strains, grain_stresses, layer_means, terzaghi_pressure
+from porefv.coupling.consolidation import grain_strains, grain_stresses, layer_means, terzaghi_pressure
 
 Z = 2
 STEPS = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])  # of the dry sample's load

@@ -100,7 +100,7 @@ def run(packing: Packing, conductance: str) -> tuple[dict[str, float], PoreFlow]
         elif stage == "triangulation":
             _ = mesh.triangulation
         elif stage == "pores":
-            _ = mesh.facet_cells, mesh.cell_pore
+            _ = mesh.facets.cells, mesh.cell_pore
         elif stage == "throats":
             _ = flow.conductances
         elif stage == "pressure":

@@ -15,10 +15,10 @@ import numpy as np
 from scale import TILES, mirrored
 
 from porefv import ComputationError, Fluid, PoreFlow, Walls
-from porefv.conjugate_gradients import imbalance
-from porefv.network import Network
-from porefv.pressure import free_network, reached
-from porefv.solvers import Solver
+from porefv.solvers.conjugate_gradients import imbalance
+from porefv.solvers.network import Network
+from porefv.solvers.pressure_equation import free_network, reached
+from porefv.solvers.solver import Solver
 
 TOLERANCE = 1e-8
 

@@ -21,8 +21,8 @@ from statistics import median
 
 from yade_flow import run_yade
 
-from porefv.progress import Progress
-from porefv.scene import Scene
+from porefv.system.progress import Progress
+from porefv.scenes.flow_scene import Scene
 
 SCENES = Path(__file__).resolve().parents[1] / "data" / "scenes"
 STEP = ("triangulation", "throats", "pressure", "forces")

@@ -10,9 +10,9 @@ import time
 
 import numpy as np
 
-from porefv.progress import Progress
-from porefv.reference.fluid_mesh import fluid_mesh
-from porefv.reference.stokes import solve_stokes
+from porefv.system.progress import Progress
+from porefv.resolved.fluid_mesh import fluid_mesh
+from porefv.resolved.stokes import solve_stokes
 
 # Solid fraction, drag over 6π μ a U.
 ZICK_HOMSY = {

@@ -20,7 +20,7 @@ from voids import widest_pores, with_grain
 from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
 from porefv.dem import Material
 from porefv.dem.generation import UniformSizes, cloud, grow
-from porefv.reference import Options, stokes_reference
+from porefv.resolved import Options, stokes_reference
 
 DATA = Path(__file__).parent.parent / "data"
 UNIT = Box([0, 0, 0], [1, 1, 1])

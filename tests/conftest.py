@@ -10,9 +10,9 @@ import pytest
 from hypothesis import settings
 
 from porefv.conductance import HydraulicRadius
-from porefv.flow import Fluid, PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 DATA = Path(__file__).parent.parent / "data"
 

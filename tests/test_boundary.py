@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.errors import InputError
-from porefv.packing import WALLS
+from porefv.packing.packing import WALLS
 
 
 def test_walls_are_impervious_and_drag_unless_said_otherwise():

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from porefv.cli import main
+from porefv.cli.program import main
 from porefv.errors import ComputationError
-from porefv.progress import Progress
-from porefv.scene import Scene
+from porefv.system.progress import Progress
+from porefv.scenes.flow_scene import Scene
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -118,14 +118,14 @@ def test_plot_draws_a_picture(tmp_path, capsys):
 
 
 def test_help_comes_at_once():
-    code = "import sys; from porefv.cli import main; main(['--help'])"
+    code = "import sys; from porefv.cli.program import main; main(['--help'])"
     seconds = []
     for _ in range(3):
         begin = time.perf_counter()
         subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
         seconds.append(time.perf_counter() - begin)
     assert min(seconds) < 0.3
-    watched = "import sys\ntry:\n from porefv.cli import main; main(['--help'])\nfinally:\n"
+    watched = "import sys\ntry:\n from porefv.cli.program import main; main(['--help'])\nfinally:\n"
     watched += " assert not {'numpy', 'numba', 'scipy', 'pyvista'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", watched], check=True, capture_output=True)
 
@@ -134,7 +134,7 @@ def test_help_comes_at_once():
 def test_vtk_is_imported_only_if_asked_for(tmp_path, vtk):
     path = write_scene(tmp_path, "n25_s1.csv", vtk)
     code = (
-        "import sys\nfrom porefv.cli import main\n"
+        "import sys\nfrom porefv.cli.program import main\n"
         f"assert main(['solve', {str(path)!r}]) == 0\n"
         "names = ('vtkmodules', 'pyvista', 'meshio', 'fipy', 'matplotlib')\n"
         "print([name for name in names if name in sys.modules])"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius, conductance_model
 from porefv.errors import InputError
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 NO_SLIP = np.zeros(6, bool)
 SYMMETRY = np.ones(6, bool)
@@ -101,7 +101,7 @@ def test_symmetry_walls_let_more_through(mesh_of, unit_flow):
 
 def conductivity(mesh, slip, *vertices):
     """μ g by the effective radius of the facet of these vertices."""
-    facet = np.flatnonzero((np.sort(mesh.facet_vertices, axis=1) == sorted(vertices)).all(axis=1))
+    facet = np.flatnonzero((np.sort(mesh.facets.vertices, axis=1) == sorted(vertices)).all(axis=1))
     return EffectiveRadius().conductivity(mesh.throats, slip)[mesh.throats.facet_throat[facet[0]]]
 
 

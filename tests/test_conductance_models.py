@@ -7,16 +7,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.conductance import AUTO, HydraulicRadius, SectionFriction, conductance_model
-from porefv.conductance.sections import LEAST_DISC, NARROWING, STRETCH
+from porefv.conductance.section_friction.model import LEAST_DISC, NARROWING, STRETCH
 from porefv.errors import InputError
-from porefv.flow import Fluid, PoreFlow
-from porefv.forces import acting_pressure, acting_weights, facet_forces, fluid_forces
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
-from porefv.patches import add_patches
-from porefv.reference import StokesReference
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.flow.forces import acting_pressure, acting_weights, facet_forces, fluid_forces
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
+from porefv.flow.pressure_along_throats import add_patches
+from porefv.resolved import StokesReference
 
 STOKES = Path(__file__).parent.parent / "data" / "reference" / "stokes"
 KINDS = ("no_slip", "symmetry")
@@ -165,7 +165,7 @@ def test_it_is_the_integral_it_says(reference):
     inscribed, portions = throats.inscribed_circles(slip)
     ratios = []
     for t, f in enumerate(throats.first_facets):
-        corners = mesh.facet_vertices[f]
+        corners = mesh.facets.vertices[f]
         if (corners >= mesh.n_spheres).any() or throats.closed[t]:
             continue
         centres, radii = mesh.packing.centres[corners], mesh.packing.radii[corners]
@@ -177,7 +177,7 @@ def test_it_is_the_integral_it_says(reference):
         mean = (angles @ radii ** (2 / 3) / np.pi) ** 1.5
         roundness = inscribed[t] / np.sqrt(neck / (np.pi * portions[t]))
         first = mesh.local_points[corners[0]]
-        begin, end = STRETCH * (throats.centres[mesh.facet_cells[f]] - first) @ throats.normals[t]
+        begin, end = STRETCH * (throats.centres[mesh.facets.cells[f]] - first) @ throats.normals[t]
 
         def resistance(s, angles=angles, radii=radii, neck=neck, mean=mean, roundness=roundness,
                        portion=portions[t], begin=begin, end=end):  # fmt: skip
@@ -282,16 +282,16 @@ def test_forces_by_the_image_behind_a_wall_of_symmetry_are_those_by_the_wall(ref
 def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
     # Every facet between three spheres of n25, on triangles of its spheres in 40 000 pieces.
     mesh = mesh_of("n25_s1")
-    throats, pressure = mesh.throats, np.zeros((len(mesh.facet_cells), 3, 3))
+    throats, pressure = mesh.throats, np.zeros((len(mesh.facets.cells), 3, 3))
     facets, starts = throats.facets_of_throats
     found = np.zeros((len(facets), 3, 3))
     add_patches(
-        np.arange(len(throats)), starts, facets, mesh.facet_cells, mesh.facet_vertices, mesh.n_spheres,
-        mesh.local_points, mesh.sizes, mesh.local_vertices, throats.facet_normals, throats.facet_necks,
+        np.arange(len(throats)), starts, facets, mesh.facets.cells, mesh.facets.vertices, mesh.n_spheres,
+        mesh.local_points, mesh.sizes, mesh.local_vertices, mesh.facets.normals, throats.doubling_heights,
         np.ones((len(pressure), 3)), found, np.zeros_like(found),
     )  # fmt: skip
     pressure[facets] = found
-    interior = np.flatnonzero((mesh.facet_vertices < mesh.n_spheres).all(axis=1) & (throats.facet_necks > 0.0))
+    interior = np.flatnonzero((mesh.facets.vertices < mesh.n_spheres).all(axis=1) & (throats.doubling_heights > 0.0))
     assert len(interior) > 70
     expected = np.array([patches(mesh, f) for f in interior])
     assert_allclose(pressure[interior], expected, atol=0.05 * np.abs(expected).max())
@@ -299,10 +299,10 @@ def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
 
 
 def patches(mesh, f):
-    corners = mesh.facet_vertices[f]
+    corners = mesh.facets.vertices[f]
     centres, radii = mesh.packing.centres[corners], mesh.packing.radii[corners]
-    normal, neck = mesh.throats.facet_normals[f], mesh.throats.facet_necks[f]
-    vertices = mesh.vertices[mesh.facet_cells[f]]
+    normal, neck = mesh.facets.normals[f], mesh.throats.doubling_heights[f]
+    vertices = mesh.vertices[mesh.facets.cells[f]]
     heights = (vertices - centres[0]) @ normal
     falls = np.array([fall(STRETCH * min(heights[0], 0.0) / neck), fall(STRETCH * max(heights[1], 0.0) / neck)])
     parts = falls / (falls[1] - falls[0])  # the vertex's pressure less that of the neck, changed in sign
@@ -338,9 +338,9 @@ def test_facet_forces_and_fluid_forces_share_alike(reference, unit_flow):
     mesh, walls = PoreMesh(reference("nine_0.4")), Walls.along("y")
     flow = unit_flow(mesh, walls, SectionFriction())
     pressure = flow.acting_pressure[mesh.cell_pore]
-    drops = pressure[mesh.facet_cells[:, 0]] - pressure[mesh.facet_cells[:, 1]]
+    drops = pressure[mesh.facets.cells[:, 0]] - pressure[mesh.facets.cells[:, 1]]
     total = np.zeros((mesh.n_spheres + 6, 3))
-    np.add.at(total, mesh.facet_vertices, facet_forces(mesh, walls.slip, "drag") * drops[:, None, None])
+    np.add.at(total, mesh.facets.vertices, facet_forces(mesh, walls.slip, "drag") * drops[:, None, None])
     assert_allclose(flow.forces.total, total[: mesh.n_spheres], atol=1e-14)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from porefv import cli
-from porefv.scene import Scene
+from porefv.scenes.flow_scene import Scene
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "data/README.md")]

@@ -14,13 +14,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from porefv import memory, results
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
 from porefv.errors import ComputationError, InputError
-from porefv.flow import Fluid, PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
-from porefv.pressure import free_network, solve_network
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
+from porefv.solvers.pressure_equation import free_network, solve_network
 from porefv.tessellation import RegularTriangulation
 
 UNIT = Box([0, 0, 0], [1, 1, 1])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.conductance import EffectiveRadius
 from porefv.errors import ComputationError, InputError
-from porefv.flow import STANDARD_GRAVITY, Fluid, PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import WALLS, Box, Packing
+from porefv.flow.pore_flow import STANDARD_GRAVITY, Fluid, PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import WALLS, Box, Packing
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 ODD_BOX = Box([-3.0, 0.25, 1e3], [-1.0, 0.5, 1e3 + 7.0])

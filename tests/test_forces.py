@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
-from porefv.flow import Fluid, PoreFlow
-from porefv.forces import fluid_forces
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.flow.forces import fluid_forces
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 NAMES = ["sc8", "nine_0.2", "nine_0.72", "n25_s1", "n54_s1", "n200_s1", "n2000_s1"]

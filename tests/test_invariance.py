@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
-from porefv.flow import Fluid, PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 NAMES = ["n54_s1", "n200_s1"]
 MODELS = [HydraulicRadius(), EffectiveRadius(), SectionFriction()]

@@ -10,7 +10,7 @@ import pytest
 # A small kernel of the package; numba's own cache would raise.
 CODE = """
 import numpy as np
-from porefv.union_find import join
+from porefv.system.union_find import join
 parent = np.arange(4)
 join(parent, 3, 1)
 join(np.arange(4, dtype=np.int32), np.int32(3), np.int32(1))

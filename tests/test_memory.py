@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from porefv import memory
-from porefv.packing import Box, Packing
+from porefv.packing.packing import Box, Packing
 
 GIB = 2**30
 MACHINE = 8 * GIB
@@ -95,7 +95,7 @@ resource.setrlimit(limit, (int(sys.argv[1]), resource.getrlimit(limit)[1]))
 del sys.argv[1]
 """
 AVAILABLE = LIMITED + "from porefv import memory; print(memory.available())"
-SOLVE = LIMITED + "from porefv.cli import main; sys.exit(main(sys.argv[1:]))"
+SOLVE = LIMITED + "from porefv.cli.program import main; sys.exit(main(sys.argv[1:]))"
 
 
 def run(code, *arguments):

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from porefv.boundary import Walls
-from porefv.cells import polyhedron_volumes
+from porefv.flow.walls import Walls
+from porefv.mesh.cells import polyhedron_volumes
 from porefv.errors import InputError
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 SMALL = ["sc8", "nine_0.72", "n25_s1", "n54_s1", "n200_s1"]
 ODD_BOX = Box([-3.0, 0.25, 1e3], [-1.0, 0.5, 1e3 + 7.0])
@@ -36,10 +36,10 @@ def test_cells_fill_a_box_of_any_place_and_shape(random_packing):
 def test_faces_of_a_cell_close(mesh_of, name):
     mesh = mesh_of(name)
     throats, faces = mesh.throats, mesh.wall_faces
-    vectors = throats.facet_areas[:, None] * throats.facet_normals
+    vectors = mesh.facets.areas[:, None] * mesh.facets.normals
     total = np.zeros((mesh.n_cells, 3))
-    np.add.at(total, mesh.facet_cells[:, 0], vectors)
-    np.add.at(total, mesh.facet_cells[:, 1], -vectors)
+    np.add.at(total, mesh.facets.cells[:, 0], vectors)
+    np.add.at(total, mesh.facets.cells[:, 1], -vectors)
     np.add.at(total, faces.cells, faces.areas[:, None] * mesh.local_points[mesh.n_spheres + faces.walls])
     # Rounding, relative to the faces of a box of unit section.
     assert_allclose(total, 0.0, rtol=0, atol=1e-15)
@@ -77,8 +77,8 @@ def test_laguerre_vertices_have_equal_power_to_their_spheres_and_lie_on_their_wa
 @pytest.mark.parametrize("name", SMALL)
 def test_facets_hold_the_three_vertices_their_cells_share_spheres_first(mesh_of, name):
     mesh = mesh_of(name)
-    assert 2 * len(mesh.facet_cells) == 4 * mesh.n_cells - 8  # all but the box's corners have two cells
-    for (i, j), vertices in zip(mesh.facet_cells.tolist(), mesh.facet_vertices.tolist(), strict=True):
+    assert 2 * len(mesh.facets.cells) == 4 * mesh.n_cells - 8  # all but the box's corners have two cells
+    for (i, j), vertices in zip(mesh.facets.cells.tolist(), mesh.facets.vertices.tolist(), strict=True):
         assert set(mesh.cells[i].tolist()) & set(mesh.cells[j].tolist()) == set(vertices)
         walls = [v >= mesh.n_spheres for v in vertices]
         assert walls == sorted(walls)
@@ -88,11 +88,11 @@ def test_facets_hold_the_three_vertices_their_cells_share_spheres_first(mesh_of,
 def test_laguerre_edges_are_normal_to_their_facets_and_point_along_them(mesh_of, name):
     mesh = mesh_of(name)
     throats = mesh.throats
-    i, j = mesh.facet_cells.T
+    i, j = mesh.facets.cells.T
     edge = mesh.vertices[j] - mesh.vertices[i]
-    along = throats.facet_lengths
+    along = mesh.facets.lengths
     # 1e-13 of the box: the rounding of the vertices of flat cells.
-    assert_allclose(edge, along[:, None] * throats.facet_normals, rtol=0, atol=1e-13)
+    assert_allclose(edge, along[:, None] * mesh.facets.normals, rtol=0, atol=1e-13)
     assert along.min() >= -1e-15
 
 
@@ -140,7 +140,7 @@ def test_lattices_keep_one_pore_for_each_hole(lattice):
 def test_tolerance_zero_unites_exact_ties_only(reference, name):
     mesh = PoreMesh(reference(name), unite_tolerance=0.0)
     assert mesh.n_pores == mesh.n_cells and mesh.n_united == 0
-    assert len(mesh.throats) == len(mesh.facet_cells)
+    assert len(mesh.throats) == len(mesh.facets.cells)
 
 
 def test_uniting_hardly_changes_the_permeability_and_keeps_volume(reference, mesh_of, unit_flow):

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from porefv import Box, InputError, Packing, PoreMesh
 from porefv.dem import DEM, Material
-from porefv.packing import WALLS
-from porefv.poromechanics import cell_strains, grain_strains, grain_stresses, layer_means
+from porefv.packing.packing import WALLS
+from porefv.coupling.consolidation import cell_strains, grain_strains, grain_stresses, layer_means
 
 
 def still(mesh):

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from porefv.errors import InputError
-from porefv.neighbours import neighbour_pairs
+from porefv.packing.neighbours import neighbour_pairs
 
 
 def brute_force(centres, radii, gap=0.0):

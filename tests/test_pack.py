@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from porefv import pack_scene
-from porefv.cli import main
+from porefv.cli.program import main
 from porefv.errors import ComputationError, InputError
-from porefv.pack_scene import PackProgress, PackScene
-from porefv.packing import Packing
+from porefv.scenes.packing_scene import PackProgress, PackScene
+from porefv.packing.packing import Packing
 
 ROOT = Path(__file__).parent.parent
 
@@ -113,7 +113,7 @@ def test_an_interruption_while_writing_leaves_the_old_file(scene, monkeypatch):
         yield "0,0,0,1"
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("porefv.io.csv.format_rows", rows)
+    monkeypatch.setattr("porefv.packing.files.csv.format_rows", rows)
     assert main(["pack", str(scene), "--force"]) == 130
     assert (scene.parent / "out.csv").read_text() == before
     assert sorted(path.name for path in scene.parent.iterdir()) == ["out.csv", "scene.toml"]

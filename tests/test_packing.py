@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from porefv.errors import InputError
-from porefv.packing import Box, Packing, Source, cap_volume, lens_volume
+from porefv.packing.packing import Box, Packing, Source, cap_volume, lens_volume
 
 PACKINGS = Path(__file__).parent.parent / "data" / "packings"
 UNIT = Box([0, 0, 0], [1, 1, 1])

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
 from porefv import InputError
-from porefv.poromechanics import (
+from porefv.coupling.consolidation import (
     consolidation_coefficient,
     critical_gradient,
     terzaghi_pressure,

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.errors import ComputationError
-from porefv.pressure import solve_network
+from porefv.solvers.pressure_equation import solve_network
 
 METHODS = ["direct", "cg"]
 NAN = np.nan

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 
 RANDOM = ["n25_s1", "n54_s1", "n200_s1", "n2000_s1", "n20000_s1"]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from porefv import results
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.errors import ComputationError, InputError
-from porefv.flow import Fluid, PoreFlow
-from porefv.packing import WALLS, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.packing.packing import WALLS, Packing
 
 PACKINGS = Path(__file__).parent.parent / "data" / "packings"
 
@@ -242,6 +242,6 @@ def test_numbers_need_no_vtk():
     code = (
         "import sys\n"
         "sys.modules['vtkmodules'] = sys.modules['pyvista'] = sys.modules['meshio'] = None\n"
-        "import porefv.results, porefv.scene, porefv.report\n"
+        "import porefv.results.directory, porefv.scenes.flow_scene, porefv.cli.text\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

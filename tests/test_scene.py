@@ -5,8 +5,8 @@ import pytest
 
 from porefv.conductance import AUTO, EffectiveRadius
 from porefv.errors import ComputationError, InputError
-from porefv.scene import Scene
-from porefv.scene_table import line_of
+from porefv.scenes.flow_scene import Scene
+from porefv.scenes.table import line_of
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -110,9 +110,9 @@ def test_alpha_scales_the_permeability():
 
 
 def test_scene_is_the_flow_of_the_same_objects_in_python():
-    from porefv.boundary import Walls
-    from porefv.flow import PoreFlow
-    from porefv.packing import Packing
+    from porefv.flow.walls import Walls
+    from porefv.flow.pore_flow import PoreFlow
+    from porefv.packing.packing import Packing
 
     scene = Scene.from_mapping(mapping(), directory=DATA / "packings")
     flow = PoreFlow(Packing.read(DATA / "packings" / "n25_s1.csv"), Walls.along("y"))
@@ -158,7 +158,7 @@ def test_without_quantities_the_pores_are_made_and_no_walls_needed(tmp_path):
 
 
 def test_check_computes_nothing(write_scene, monkeypatch):
-    from porefv.mesh import PoreMesh
+    from porefv.mesh.pore_mesh import PoreMesh
 
     def refuse(self):
         raise AssertionError("check must not triangulate")
@@ -266,7 +266,7 @@ def test_packing_that_does_not_fit_is_refused_before_anything_is_written(tmp_pat
 
 
 def test_failed_computation_leaves_nothing_behind(tmp_path, monkeypatch):
-    from porefv.flow import PoreFlow
+    from porefv.flow.pore_flow import PoreFlow
 
     def fail(self):
         raise ComputationError("the solver failed")

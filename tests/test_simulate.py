@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from porefv.cli import main
+from porefv.cli.program import main
 from porefv.errors import ComputationError, InputError, MissingExtraError
-from porefv.packing import WALLS
+from porefv.packing.packing import WALLS
 from porefv.simulation import SimulationScene, ledger, read_profiles, read_series, scene, series
-from porefv.simulation.drainage import Polyline, Sine
-from porefv.simulation.measures import layer_stresses
+from porefv.coupling.walls_in_time import PressureTable, Sine
+from porefv.simulation.measurements import layer_stresses
 from porefv.simulation.progress import Moment, SimulationProgress, duration
 
 ROOT = Path(__file__).parent.parent
@@ -127,7 +127,7 @@ def test_the_effective_stress_of_layers_is_that_of_the_sample_and_the_pressure_f
     assert layer_stresses(dem, 2, edges).mean() == pytest.approx(dem.stress[2, 2], rel=1e-12)
 
 
-def test_pressures_follow_their_course(path):
+def test_pressures_follow_their_pressure_history(path):
     """A pressure that rises on one wall drives a flow that follows it, grains being too heavy and held."""
     text = WET.replace("z_min = { pressure = 0.0 }", "z_min = { pressure = 0.0 }\nz_max = { pressure = 0.0 }")
     text = text.replace("plates = { z_max = { stress = 6.0e3, top_speed = 0.1 } }\n", "plates = { z_max = {} }\n")
@@ -142,7 +142,7 @@ def test_pressures_follow_their_course(path):
     found = json.loads((path.parent / "results" / "simulation.json").read_text())
     begin, then = (span["begin"] for span in found["spans"][1:])
     middle = wet["time"] - 0.5 * (wet["time"][-1] - wet["time"][-2])
-    rising = Polyline((0.0, 0.001), (0.0, 100.0))
+    rising = PressureTable((0.0, 0.001), (0.0, 100.0))
     swinging = Sine(100.0, 50.0, 0.002)
     expected = [
         rising.at(t - begin) if stage == 2 else swinging.at(t - then)
@@ -160,7 +160,7 @@ def test_buoyancy_is_there_with_the_fluid_and_gone_without(path, monkeypatch):
         seen.append(np.array(forces)[:, 2].sum())
         recorded(dem, forces)
 
-    monkeypatch.setattr("porefv.simulation.measures.unbalanced", lambda dem, coupling: 0.0)
+    monkeypatch.setattr("porefv.simulation.measurements.unbalanced", lambda dem, coupling: 0.0)
     monkeypatch.setattr(scene.DEM, "apply", apply)
     text = "gravity = [0.0, 0.0, -10.0]\n" + WET.replace("duration = 0.02", "duration = 0.001")
     run(path, text.replace("[output]", "[[stages]]\nfluid = false\nduration = 0.001\n[output]"))
@@ -400,7 +400,7 @@ def test_plot_draws_series(path):
     found = run(path, WET)
     assert main(["plot", str(found), "--out", str(path.parent / "picture.png")]) == 0
     assert (path.parent / "picture.png").read_bytes().startswith(b"\x89PNG")
-    from porefv.simulation.plot import series_picture
+    from porefv.simulation.series_picture import series_picture
 
     pressures, stresses, strains, profiles = series_picture(found).axes
     rows = read_series(found)

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from porefv.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
 from porefv.errors import ComputationError, InputError
-from porefv.network import Network
-from porefv.solvers import DIRECT_LIMIT, SOLVERS, TOLERANCE, Solver
+from porefv.solvers.network import Network
+from porefv.solvers.solver import DIRECT_LIMIT, SOLVERS, TOLERANCE, Solver
 
 METHODS = ["direct", "cg"]
 
@@ -279,7 +279,7 @@ def test_unknown_solver_and_senseless_tolerance_are_refused():
 
 
 def test_a_solver_that_does_not_converge_says_so(monkeypatch):
-    monkeypatch.setattr("porefv.conjugate_gradients._MAX_ITERATIONS", 2)
+    monkeypatch.setattr("porefv.solvers.conjugate_gradients._MAX_ITERATIONS", 2)
     network, rhs = grid_network(10, 6)
     with pytest.raises(ComputationError, match="cg solver stopped at a flux imbalance of .* after 2 iterations"):
         solve(network, rhs, "cg")

@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from porefv import cli
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.errors import InputError
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
-from porefv.reference import Options, Run, StokesReference, Values, stokes_reference
-from porefv.reference.geometry import contacts
-from porefv.reference.sampling import cells_of, facet_points
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
+from porefv.resolved import Options, Run, StokesReference, Values, stokes_reference
+from porefv.resolved.fluid_geometry import contacts
+from porefv.resolved.mesh_sampling import cells_of, facet_points
 
 STORED = sorted((Path(__file__).parent.parent / "data" / "reference" / "stokes").glob("*.json"))
 UNIT = Box([0, 0, 0], [1, 1, 1])
@@ -27,14 +27,14 @@ UNIT = Box([0, 0, 0], [1, 1, 1])
 def test_points_on_facets_fill_their_fluid_areas(mesh_of, name):
     mesh = mesh_of(name)
     points = facet_points(mesh)
-    areas = np.bincount(points.facets, points.weights, len(mesh.facet_cells))
+    areas = np.bincount(points.facets, points.weights, len(mesh.facets.cells))
     throats = mesh.throats
     # Where spheres overlap, areas are signed and points are not: facets that this touches are the closed ones.
-    exact = throats.facet_fluid_areas
-    sound = exact > 1e-3 * throats.facet_areas
+    exact = mesh.facets.fluid_areas
+    sound = exact > 1e-3 * mesh.facets.areas
     assert_allclose(areas[sound], exact[sound], rtol=2e-3)
-    offsets = mesh.local_points[mesh.facet_vertices[points.facets, 0]] - points.points
-    assert_allclose((offsets * throats.facet_normals[points.facets]).sum(axis=1), 0.0, atol=1e-12)
+    offsets = mesh.local_points[mesh.facets.vertices[points.facets, 0]] - points.points
+    assert_allclose((offsets * mesh.facets.normals[points.facets]).sum(axis=1), 0.0, atol=1e-12)
 
 
 def test_every_point_is_in_one_cell_and_cells_have_their_volumes(mesh_of):
@@ -61,14 +61,14 @@ def made_up(mesh_of):
     """A reference with made-up values on a real mesh."""
     mesh = mesh_of("nine_0.72")
     rng = np.random.default_rng(1)
-    shapes = [(9, 3), (9, 3), (6, 3), (6, 3), 6, len(mesh.facet_cells), len(mesh.wall_faces.cells), mesh.n_cells]
+    shapes = [(9, 3), (9, 3), (6, 3), (6, 3), 6, len(mesh.facets.cells), len(mesh.wall_faces.cells), mesh.n_cells]
     arrays = [rng.normal(size=shape) for shape in [*shapes, mesh.n_cells]]
     arrays[-1][::3] = np.nan
     return StokesReference(
         name="made up", packing=mesh.packing, walls=Walls.along("y", slip=True), viscosity=2.0, values=Values(*arrays),
         errors={"permeability": 1e-6}, permeability=3e-4, order=3, contacts="caps",
         runs=[Run(0.5, 0.03, 10, 100, 0, 1.0, 3e-4, 1e-16, 1e-3)], cells=mesh.cells,
-        facet_vertices=mesh.facet_vertices, facet_cells=mesh.facet_cells, face_cells=mesh.wall_faces.cells,
+        facet_vertices=mesh.facets.vertices, facet_cells=mesh.facets.cells, face_cells=mesh.wall_faces.cells,
         face_walls=mesh.wall_faces.walls, versions={"ngsolve": "6"},
     )  # fmt: skip
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
 
 NO_SLIP = np.zeros(6, bool)
 ROOT_3 = np.sqrt(3.0)
@@ -22,7 +22,7 @@ def ball(r):
 def sphere_surfaces(mesh):
     """(n,): Σγ^k over the facets of each sphere; (6,): the same for the walls."""
     total = np.zeros(mesh.n_spheres + 6)
-    np.add.at(total, mesh.facet_vertices, mesh.throats.facet_surfaces)
+    np.add.at(total, mesh.facets.vertices, mesh.facets.surfaces)
     return total[: mesh.n_spheres], total[mesh.n_spheres :]
 
 
@@ -33,7 +33,7 @@ def segment(r, d):
 
 def facet_throat(mesh, *vertices):
     """The one throat of the facet of these vertices: spheres by id, walls by n + id."""
-    facet = np.flatnonzero((np.sort(mesh.facet_vertices, axis=1) == sorted(vertices)).all(axis=1))
+    facet = np.flatnonzero((np.sort(mesh.facets.vertices, axis=1) == sorted(vertices)).all(axis=1))
     assert len(facet) == 1
     return mesh.throats.facet_throat[facet[0]]
 
@@ -54,7 +54,7 @@ def test_sums_are_exact_for_any_packing_without_overlap(random_packing, case, bo
     r = mesh.packing.radii
     throats = mesh.throats
     # A few hundred roundings of terms no larger than the whole; polydispersity adds terms that cancel.
-    assert_allclose(throats.facet_volumes.sum(), box.volume - ball(r).sum(), rtol=1e-12)
+    assert_allclose(mesh.facets.volumes.sum(), box.volume - ball(r).sum(), rtol=1e-12)
     spheres, walls = sphere_surfaces(mesh)
     assert_allclose(spheres, 4 * np.pi * r**2, rtol=1e-12)
     assert_allclose(walls, [box.section(wall // 2) for wall in range(6)], rtol=1e-12)
@@ -65,7 +65,7 @@ def test_sums_are_exact_for_any_packing_without_overlap(random_packing, case, bo
 def test_sums_are_exact_for_a_large_polydisperse_packing(random_packing):
     mesh = PoreMesh(random_packing(1500, ratio=0.05, seed=3))
     r = mesh.packing.radii
-    assert_allclose(mesh.throats.facet_volumes.sum(), 1.0 - ball(r).sum(), rtol=1e-12)
+    assert_allclose(mesh.facets.volumes.sum(), 1.0 - ball(r).sum(), rtol=1e-12)
     spheres, walls = sphere_surfaces(mesh)
     assert_allclose(spheres, 4 * np.pi * r**2, rtol=1e-12)
     assert_allclose(walls, 1.0, rtol=1e-12)
@@ -76,7 +76,7 @@ def test_sums_are_exact_for_a_large_polydisperse_packing(random_packing):
 def test_sums_are_exact_for_lattices(lattice, kind, m, radius):
     mesh = PoreMesh(lattice(kind, m, radius, spacing=0.3))
     r = mesh.packing.radii
-    assert_allclose(mesh.throats.facet_volumes.sum(), mesh.box.volume - ball(r).sum(), rtol=1e-12)
+    assert_allclose(mesh.facets.volumes.sum(), mesh.box.volume - ball(r).sum(), rtol=1e-12)
     assert_allclose(sphere_surfaces(mesh)[0], 4 * np.pi * r**2, rtol=1e-12)
 
 
@@ -85,7 +85,7 @@ def test_throats_of_reference_packings_hold_their_void_overlaps_included(mesh_of
     mesh = mesh_of(name)
     void = mesh.packing.porosity * mesh.box.volume
     # 1e-12 for a void that is a difference of sums over 20 000 spheres.
-    assert_allclose(mesh.throats.facet_volumes.sum(), void, rtol=1e-12)
+    assert_allclose(mesh.facets.volumes.sum(), void, rtol=1e-12)
 
 
 def test_surfaces_of_reference_packings_are_those_outside_their_neighbours(mesh_of):
@@ -120,7 +120,7 @@ def test_lens_of_two_overlapping_spheres_is_counted_once(r1, r2, depth, along):
     h1, h2 = r1 - x1, r2 - (d - x1)
     lens = np.pi * (h1 * h1 * (r1 - h1 / 3) + h2 * h2 * (r2 - h2 / 3))
     void = 1.0 - ball(r1) - ball(r2) + lens
-    assert_allclose(mesh.throats.facet_volumes.sum(), void, rtol=1e-12)
+    assert_allclose(mesh.facets.volumes.sum(), void, rtol=1e-12)
     assert_allclose(mesh.cell_void_volumes.sum(), void, rtol=1e-12)
     free = [4 * np.pi * r1**2 - 2 * np.pi * r1 * h1, 4 * np.pi * r2**2 - 2 * np.pi * r2 * h2]
     assert_allclose(sphere_surfaces(mesh)[0], free, rtol=1e-12)
@@ -135,7 +135,7 @@ def test_cap_beyond_a_wall_is_left_out(wall, depth):
     centre[wall // 2] = box.size[wall // 2] - r + h if wall % 2 else r - h
     mesh = PoreMesh(Packing([centre], [r], box), wall_tolerance=0.7)
     void = box.volume - ball(r) + np.pi * h * h * (r - h / 3)
-    assert_allclose(mesh.throats.facet_volumes.sum(), void, rtol=1e-13)
+    assert_allclose(mesh.facets.volumes.sum(), void, rtol=1e-13)
     assert_allclose(mesh.cell_void_volumes.sum(), void, rtol=1e-13)
     spheres, walls = sphere_surfaces(mesh)
     assert_allclose(spheres[0], 4 * np.pi * r * r - 2 * np.pi * r * h, rtol=1e-13)
@@ -212,7 +212,7 @@ def test_facets_of_a_tie_are_one_throat(mesh_of):
     # The squares of a cubic lattice are cut into triangles; each square is one throat of the lattice's area.
     mesh = mesh_of("sc8")
     throats = mesh.throats
-    assert len(throats) == 54 < len(mesh.facet_cells)
+    assert len(throats) == 54 < len(mesh.facets.cells)
     square = np.isclose(throats.areas, 0.25)
     assert square.sum() == 6  # from the middle of the box to its six neighbours
     assert_allclose(throats.fluid_areas[square], 0.25 - np.pi * 0.25**2, rtol=1e-14)
@@ -225,7 +225,7 @@ def test_throats_between_united_pores_leave_none_inside(mesh_of):
     throats = mesh.throats
     assert (throats.pores[:, 0] != throats.pores[:, 1]).all()
     inside = throats.facet_throat < 0
-    np.testing.assert_array_equal(inside, np.equal(*mesh.cell_pore[mesh.facet_cells].T))
+    np.testing.assert_array_equal(inside, np.equal(*mesh.cell_pore[mesh.facets.cells].T))
     assert len(throats) == (~inside).sum()  # a random packing has no ties
 
 
@@ -235,8 +235,8 @@ def test_symmetry_walls_do_not_drag(mesh_of):
     throats = mesh.throats
     lost = (throats.wetted_surfaces(NO_SLIP) - throats.wetted_surfaces(slip)).sum()
     inside = throats.facet_throat < 0  # surfaces inside a united pore belong to no throat
-    walls = (mesh.facet_vertices >= mesh.n_spheres) & slip[np.maximum(mesh.facet_vertices - mesh.n_spheres, 0)]
-    assert_allclose(lost, (throats.facet_surfaces * walls)[~inside].sum(), rtol=1e-12)
+    walls = (mesh.facets.vertices >= mesh.n_spheres) & slip[np.maximum(mesh.facets.vertices - mesh.n_spheres, 0)]
+    assert_allclose(lost, (mesh.facets.surfaces * walls)[~inside].sum(), rtol=1e-12)
     assert_allclose(lost, 4.0, rtol=0.01)
 
 
@@ -325,16 +325,16 @@ def test_centres_are_drawn_as_far_as_they_say(reference):
     for c in np.flatnonzero(alone):
         vertex = mesh.local_vertices[c]
         parts, ways = [], np.zeros((0, 3))
-        for f, side in zip(*np.nonzero(mesh.facet_cells == c), strict=True):
-            (apex,) = set(mesh.cells[c]) - set(mesh.facet_vertices[f])
-            spheres = [k for k in mesh.facet_vertices[f] if k < n]
+        for f, side in zip(*np.nonzero(mesh.facets.cells == c), strict=True):
+            (apex,) = set(mesh.cells[c]) - set(mesh.facets.vertices[f])
+            spheres = [k for k in mesh.facets.vertices[f] if k < n]
             if apex >= n or mesh.sizes[apex] >= min(mesh.sizes[spheres]):
                 continue
-            inward = throats.facet_normals[f] * (1 if side == 1 else -1)
+            inward = mesh.facets.normals[f] * (1 if side == 1 else -1)
             height, above = ((x - mesh.local_points[spheres[0]]) @ inward for x in (vertex, mesh.local_points[apex]))
             wanted = 0.5 * (1 - mesh.sizes[apex] / min(mesh.sizes[spheres])) * above
             if height < wanted:
-                asks = min(1, throats.facet_lengths[f] / (0.1 * min(mesh.sizes[spheres])))
+                asks = min(1, mesh.facets.lengths[f] / (0.1 * min(mesh.sizes[spheres])))
                 short += asks < 1
                 parts.append(asks * min(1, above / mesh.sizes[apex]) * (wanted - height) / (above - height))
                 ways = np.vstack([ways, parts[-1] * (mesh.local_points[apex] - vertex)])

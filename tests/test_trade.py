@@ -7,7 +7,7 @@ import pytest
 
 from porefv import InputError, Packing, PoreFlow, Walls, cli
 from porefv.conductance import MODELS, conductance_model
-from porefv.trade.ladder import Outcome, Rung, Trade, climb, ladder, trade
+from porefv.comparison.methods import Outcome, Rung, Trade, climb, ladder, trade
 
 SCENE = """
 packing = "{packing}"

@@ -29,7 +29,7 @@ def run(name, folder, *expressions):
 def test_forces_from_a_packing_file_to_a_picture(tmp_path):
     permeability, void, residual, total, walls, ratio, strongest = run(
         "forces.ipynb", tmp_path,
-        "flow.permeability", "void - throats.facet_volumes.sum()", "forces.conservation_residual",
+        "flow.permeability", "void - mesh.facets.volumes.sum()", "forces.conservation_residual",
         "forces.sums['total'].tolist()", "forces.sums['wall_total'].tolist()", "ratio.mean()", "strongest",
     )  # fmt: skip
     assert permeability == pytest.approx(6.4490e-6, rel=1e-4)

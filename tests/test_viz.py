@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from porefv import results, viz
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.errors import ComputationError, InputError
-from porefv.flow import PoreFlow
-from porefv.packing import Box, Packing
+from porefv.flow.pore_flow import PoreFlow
+from porefv.packing.packing import Box, Packing
 
 pyvista = pytest.importorskip("pyvista")
 PACKINGS = Path(__file__).parent.parent / "data" / "packings"

@@ -3,12 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.errors import InputError
-from porefv.flow import PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import Box, Packing
-from porefv.vtk_mesh import (
+from porefv.flow.pore_flow import PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box, Packing
+from porefv.export.vtk import (
     HEXAHEDRON,
     TETRA,
     WEDGE,

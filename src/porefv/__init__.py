@@ -1,6 +1,27 @@
 """porefv: viscous flow through packings of spheres, by finite volumes on the mesh of their pores.
 
-Everything public is reachable from here and loaded when first used::
+Data flow through the folders of the package in this order; a folder imports only from those before it:
+
+    errors          all errors
+    system          kernels, threads, memory, progress, files: no physics
+    packing         spheres, box, overlaps, neighbours, packing files
+    tessellation    exact regular triangulation of spheres and walls
+    mesh            cells, facets, throats, pores
+    conductance     how much flows through a throat: models
+    solvers         the pressure equation on a network
+    flow            walls, fluid, pressure, fluxes, velocities, forces
+    fipy            the pores as a FiPy mesh
+    dem             grains that move: discrete element method
+    coupling        grains and fluid together, micromechanics, consolidation
+    export          VTK, meshio, pictures, trajectories
+    results         results directories
+    scenes          scene files
+    simulation      runs in stages
+    resolved        resolved Stokes flow, as a reference
+    comparison      error against time of each method
+    cli             the command `porefv`
+
+What most scripts need is reachable from here and loaded when first used::
 
     from porefv import Packing, PoreFlow, Walls
 
@@ -9,40 +30,68 @@ Everything public is reachable from here and loaded when first used::
 """
 
 import os
-from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
+
+from porefv.system.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from porefv.conductance.conductances import throat_conductances
+    from porefv.conductance.effective_radius import EffectiveRadius
+    from porefv.conductance.hydraulic_radius import HydraulicRadius
+    from porefv.conductance.model import ConductanceModel
+    from porefv.conductance.section_friction.model import SectionFriction
+    from porefv.errors import ComputationError, InputError, PorefvError
+    from porefv.flow.fluid import Fluid
+    from porefv.flow.flux import fluxes
+    from porefv.flow.forces import Forces, grain_forces
+    from porefv.flow.pore_flow import PoreFlow
+    from porefv.flow.pressure import PressureField, solve_pressure
+    from porefv.flow.walls import Wall, Walls
+    from porefv.mesh.cell_mesh import CellMesh
+    from porefv.mesh.pore_mesh import PoreMesh
+    from porefv.mesh.throats import Throats
+    from porefv.packing.box import WALLS, Box
+    from porefv.packing.packing import Packing
+    from porefv.tessellation.triangulation import RegularTriangulation
 
 __version__ = "0.1.0"
 
 # With TBB, which numba would take first, every call of a parallel kernel is slower than the one before.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
-_HOME = {
-    "Box": "packing",
-    "ComputationError": "errors",
-    "EffectiveRadius": "conductance",
-    "Fluid": "flow",
-    "Forces": "forces",
-    "HydraulicRadius": "conductance",
-    "InputError": "errors",
-    "Packing": "packing",
-    "PoreFlow": "flow",
-    "PoreMesh": "mesh",
-    "PorefvError": "errors",
-    "RegularTriangulation": "tessellation",
-    "SectionFriction": "conductance",
-    "Throats": "throats",
-    "WALLS": "packing",
-    "Wall": "boundary",
-    "Walls": "boundary",
+_HOMES = {
+    "Box": "porefv.packing.box",
+    "CellMesh": "porefv.mesh.cell_mesh",
+    "ComputationError": "porefv.errors",
+    "ConductanceModel": "porefv.conductance.model",
+    "EffectiveRadius": "porefv.conductance.effective_radius",
+    "Fluid": "porefv.flow.fluid",
+    "Forces": "porefv.flow.forces",
+    "HydraulicRadius": "porefv.conductance.hydraulic_radius",
+    "InputError": "porefv.errors",
+    "Packing": "porefv.packing.packing",
+    "PoreFlow": "porefv.flow.pore_flow",
+    "PoreMesh": "porefv.mesh.pore_mesh",
+    "PorefvError": "porefv.errors",
+    "PressureField": "porefv.flow.pressure",
+    "RegularTriangulation": "porefv.tessellation.triangulation",
+    "SectionFriction": "porefv.conductance.section_friction.model",
+    "Throats": "porefv.mesh.throats",
+    "WALLS": "porefv.packing.box",
+    "Wall": "porefv.flow.walls",
+    "Walls": "porefv.flow.walls",
+    "fluxes": "porefv.flow.flux",
+    "grain_forces": "porefv.flow.forces",
+    "solve_pressure": "porefv.flow.pressure",
+    "throat_conductances": "porefv.conductance.conductances",
 }
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"porefv.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'porefv' has no attribute {name!r}")
+__all__ = [
+    "Box", "CellMesh", "ComputationError", "ConductanceModel", "EffectiveRadius", "Fluid", "Forces",
+    "HydraulicRadius", "InputError", "Packing", "PoreFlow", "PoreMesh", "PorefvError", "PressureField",
+    "RegularTriangulation", "SectionFriction", "Throats", "WALLS", "Wall", "Walls", "fluxes", "grain_forces",
+    "solve_pressure", "throat_conductances",
+]  # fmt: skip
+__getattr__ = lazy_exports(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -2,7 +2,7 @@
 
 import sys
 
-from porefv.cli import main
+from porefv.cli.program import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -11,7 +11,7 @@ from porefv.conductance import MODELS, SectionFriction
 from porefv.coupling import Coupling, Exchange, checkpoint
 from porefv.dem import DEM, Material, Plate
 from porefv.errors import InputError
-from porefv.forces import acting_weights
+from porefv.flow.forces import acting_weights
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 SEALED = Walls.from_mapping({"lateral": {"slip": True}})

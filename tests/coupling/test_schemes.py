@@ -102,7 +102,7 @@ def test_the_implicit_step_is_stable_at_the_dry_limit(skeleton, viscosity):
 
 def test_a_semi_implicit_step_beyond_its_limit_runs_away(skeleton, monkeypatch):
     # What is refused deserves it: a little above a drag number of 2 velocities grow, a little below they do not.
-    import porefv.coupling.coupled as coupled
+    import porefv.coupling.coupling as coupled
 
     monkeypatch.setattr(coupled, "_UNSTABLE", np.inf)
     grown = {}

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, InputError, Packing
 from porefv.dem import DEM, Material, Plate, checkpoint
-from porefv.dem.trajectory import Trajectory
+from porefv.export.trajectories import Trajectory
 
 pyvista = pytest.importorskip("pyvista")
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
@@ -148,13 +148,13 @@ def test_the_list_names_complete_frames_only_and_is_replaced_at_once(tmp_path, m
     before = (tmp_path / "grains.pvd").read_bytes()
     dem.run(10)
 
-    import porefv.vtk_mesh
+    import porefv.export.vtk
 
     def full(dataset, path):
         path.write_bytes(b"half a frame")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(porefv.vtk_mesh, "write_xml", full)
+    monkeypatch.setattr(porefv.export.vtk, "write_xml", full)
     with pytest.raises(InputError, match="cannot write .*grains_000000010.vtp.*No space left"):
         trajectory.write()
     assert (tmp_path / "grains.pvd").read_bytes() == before
@@ -256,8 +256,8 @@ def test_a_file_in_place_of_the_directory_is_named(tmp_path):
 def test_vtk_is_loaded_by_those_who_write_frames_only():
     program = """
 import sys
-import porefv.dem.checkpoint, porefv.dem.protocol, porefv.dem.trajectory
-print([name for name in ("pyvista", "vtkmodules", "porefv.mesh") if name in sys.modules])
+import porefv.dem.checkpoint, porefv.dem.protocol, porefv.export.trajectories
+print([name for name in ("pyvista", "vtkmodules", "porefv.mesh.pore_mesh") if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

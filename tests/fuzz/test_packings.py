@@ -6,12 +6,12 @@ import numpy as np
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from porefv.boundary import Wall, Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
 from porefv.errors import PorefvError
-from porefv.flow import Fluid, PoreFlow
-from porefv.mesh import PoreMesh
-from porefv.packing import WALLS, Box, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import WALLS, Box, Packing
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 
@@ -106,7 +106,7 @@ def check(flow):
     if mesh.packing.triple_overlaps == 0:
         assert mesh.packing.porosity_error == 0.0
         void = mesh.packing.porosity * box.volume
-        assert abs(mesh.throats.facet_volumes.sum() - void) < 1e-9 * box.volume
+        assert abs(mesh.facets.volumes.sum() - void) < 1e-9 * box.volume
         assert abs(mesh.cell_void_volumes.sum() - void) < 1e-9 * box.volume
     report, forces = flow.solver_report, flow.forces
     for values in (

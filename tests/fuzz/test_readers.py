@@ -11,11 +11,11 @@ from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from porefv import cli, results
-from porefv.boundary import Walls
+from porefv.flow.walls import Walls
 from porefv.errors import PorefvError
-from porefv.flow import Fluid, PoreFlow
-from porefv.io import read_packing
-from porefv.packing import Box, Packing
+from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.packing.files import read_packing
+from porefv.packing.packing import Box, Packing
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from porefv import results
 from porefv.errors import PorefvError
-from porefv.packing import WALLS
-from porefv.scene import Scene
+from porefv.packing.packing import WALLS
+from porefv.scenes.flow_scene import Scene
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 

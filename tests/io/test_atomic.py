@@ -4,7 +4,7 @@ import stat
 import pytest
 
 from porefv.errors import InputError
-from porefv.io import atomic_directory, atomic_write
+from porefv.packing.files import atomic_directory, atomic_write
 
 posix = pytest.mark.skipif(os.name != "posix", reason="permissions and links of POSIX")
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from porefv.errors import InputError
-from porefv.packing import Box, Packing
+from porefv.packing.packing import Box, Packing
 
 
 @pytest.fixture

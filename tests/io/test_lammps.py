@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError
-from porefv.packing import Packing
+from porefv.packing.packing import Packing
 
 DATA = """LAMMPS data file, any title: Atoms
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError, MissingExtraError
-from porefv.io import EXTENSIONS, read_packing, write_packing
-from porefv.packing import Box, Packing
+from porefv.packing.files import EXTENSIONS, read_packing, write_packing
+from porefv.packing.packing import Box, Packing
 
 PACKING = Packing([[0.1, 0.2, 0.3], [0.7, 1 / 3, 0.5]], [0.05, 0.1], Box([0, 0, 0], [1, 2, 3]))
 TEXT_FORMATS = ("csv", "yade", "lammps")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError
-from porefv.packing import Box, Packing
+from porefv.packing.packing import Box, Packing
 
 
 @pytest.fixture

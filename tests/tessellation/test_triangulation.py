@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from porefv.errors import ComputationError
-from porefv.mesh import PoreMesh
-from porefv.packing import Box
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Box
 from porefv.tessellation import RegularTriangulation
 from porefv.tessellation.triangulation import exact_origin
 

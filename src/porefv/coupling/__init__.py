@@ -1,7 +1,19 @@
-"""Grains and fluid together."""
+"""Grains and fluid together: coupled steps, consolidation, stress and strain of the grains."""
 
-from porefv.coupling.coupled import SCHEMES, Coupling, Effort
+from porefv.coupling.consolidation import (
+    consolidation_coefficient,
+    critical_gradient,
+    terzaghi_pressure,
+    terzaghi_settlement,
+)
+from porefv.coupling.coupled_pressure import CoupledPressure, Power
+from porefv.coupling.coupling import SCHEMES, Coupling, Effort
+from porefv.coupling.end_correction import Permeameter, permeameter
 from porefv.coupling.exchange import EXCHANGES, Exchange
-from porefv.coupling.fluid import PoreFluid, Power
+from porefv.coupling.micromechanics import cell_strains, grain_strains, grain_stresses, layer_means
 
-__all__ = ["EXCHANGES", "SCHEMES", "Coupling", "Effort", "Exchange", "PoreFluid", "Power"]
+__all__ = [
+    "EXCHANGES", "SCHEMES", "CoupledPressure", "Coupling", "Effort", "Exchange", "Permeameter", "Power", "cell_strains",
+    "consolidation_coefficient", "critical_gradient", "grain_strains", "grain_stresses", "layer_means", "permeameter",
+    "terzaghi_pressure", "terzaghi_settlement",
+]  # fmt: skip

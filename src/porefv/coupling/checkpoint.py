@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 
 from porefv import __version__
-from porefv.boundary import Walls
-from porefv.conductance import conductance_model
-from porefv.coupling.coupled import Coupling, Effort
-from porefv.dem import DEM
+from porefv.conductance.registry import conductance_model
+from porefv.coupling.coupling import Coupling, Effort
 from porefv.dem import checkpoint as grains_checkpoint
+from porefv.dem.dem import DEM
 from porefv.errors import InputError
-from porefv.flow import Fluid
-from porefv.io.atomic import atomic_write
-from porefv.packing import WALLS, Box, Packing
+from porefv.flow.fluid import Fluid
+from porefv.flow.walls import Walls
+from porefv.packing.box import WALLS, Box
+from porefv.packing.packing import Packing
+from porefv.system.atomic_files import atomic_write
 
 FORMAT, VERSION = "porefv.coupling", 1
 

@@ -3,8 +3,8 @@
 One operator E serves for both, so that the work of the fluid on the grains is the work it takes from the pores, to
 the last digit. There are two such operators:
 
-- `facets`: Eᵀ is the force operator S of a steady flow, by C12 (eq. 14, 17, 18) or as its model of conductance has
-  it. E = Sᵀ is then the rate of the fluid's volume in a pore whose throats move with the mean velocity of the solids
+- `facets`: Eᵀ is the force operator S of a steady flow, by C12 (eq. 14, 17, 18) or by the conductance model's force
+  split. E = Sᵀ is then the rate of the fluid's volume in a pore whose throats move with the mean velocity of the solids
   around them, each weighted by its wetted surface: what the throat's flow is relative to, by reciprocity.
 - `volumes`: E is the exact derivative of the volume of the pore's cells, solid included; Eᵀ shares the force on a
   facet equally among its three vertices.
@@ -18,10 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from porefv.forces import facet_forces
-from porefv.kernels import njit
-from porefv.mesh import PoreMesh
-from porefv.tessellation.triangulation import wall_normals
+from porefv.conductance.model import ForceSplit
+from porefv.flow.forces import facet_forces
+from porefv.flow.solid_pressure import SolidPressureWeights
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALL_NORMALS
+from porefv.system.kernels import njit
 
 EXCHANGES = ("facets", "volumes")
 
@@ -51,10 +53,10 @@ class Exchange:
         mesh: PoreMesh,
         kind: str,
         slip: np.ndarray,
-        slots: np.ndarray | None = None,
+        grain_rows: np.ndarray | None = None,
         *,
-        shares: str = "surface",
-        leaning: tuple[np.ndarray, np.ndarray] | None = None,
+        split: ForceSplit = "surface",
+        solid_pressure: SolidPressureWeights | None = None,
     ) -> Exchange:
         """The operator of a mesh.
 
@@ -64,23 +66,24 @@ class Exchange:
         kind : {'facets', 'volumes'}
         slip : (6,) bool array
             Walls that do not drag the fluid.
-        slots : (n,) int array, optional
-            Row of each grain, its id by default.
-        shares : {'surface', 'drag'}
-            How vertices share the drag of a throat, where forces are by facets (see `fluid_forces`).
-        leaning : two (u, 2) arrays, optional
-            How the pressures of other pores act on the solid of a pore, by facets (see `acting_weights`).
+        grain_rows : (n,) int array, optional
+            Row of each grain in arrays of velocities and forces, its id by default.
+        split : {'surface', 'drag'}
+            How the vertices of a throat divide its drag, with the kind 'facets' (see `porefv.flow.grain_forces`).
+        solid_pressure : SolidPressureWeights, optional
+            How the pressures of other pores act on the grains of a pore, with the kind 'facets'.
         """
         n = mesh.n_spheres
-        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, shares)
+        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, split)
         number = np.arange(n + 6, dtype=np.uint32)
-        if slots is not None:
-            number[:n] = slots
+        if grain_rows is not None:
+            number[:n] = grain_rows
         found = cls(number[mesh.cells], gradients, np.arange(mesh.n_cells, dtype=np.uint32))
-        return found if kind == "volumes" or leaning is None else found._leaning(mesh, *leaning)
+        return found if kind == "volumes" or solid_pressure is None else found._interpolated(mesh, solid_pressure)
 
-    def _leaning(self, mesh: PoreMesh, pores: np.ndarray, weights: np.ndarray) -> Exchange:
-        """The same with pressures of neighbours acting on the solid of pores, by these weights."""
+    def _interpolated(self, mesh: PoreMesh, solid_pressure: SolidPressureWeights) -> Exchange:
+        """The same with pressures of neighbours acting on the grains of pores, by these weights."""
+        pores, weights = solid_pressure.pores, solid_pressure.weights
         order, firsts = mesh.cells_of_pores
         throat, side = np.nonzero(weights)
         here, there = pores[throat, side], pores[throat, 1 - side]
@@ -123,12 +126,12 @@ class Exchange:
         spread(self.rows, self.gradients, self.nodes, pressure, out)
 
 
-def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, shares: str) -> np.ndarray:
+def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> np.ndarray:
     gradients = np.zeros((mesh.n_cells, 4, 3))
-    _gather_facets(mesh.cells, mesh.facet_cells, mesh.facet_vertices, facet_forces(mesh, slip, shares), gradients)
+    _gather_facets(mesh.cells, mesh.facets.cells, mesh.facets.vertices, facet_forces(mesh, slip, split), gradients)
     faces = mesh.wall_faces
     on_wall = (mesh.cells[faces.cells] == (mesh.n_spheres + faces.walls)[:, None]).argmax(axis=1)
-    np.add.at(gradients, (faces.cells, on_wall), faces.areas[:, None] * wall_normals()[faces.walls])
+    np.add.at(gradients, (faces.cells, on_wall), faces.areas[:, None] * WALL_NORMALS[faces.walls])
     return gradients
 
 

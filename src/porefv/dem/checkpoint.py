@@ -16,15 +16,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from porefv import __version__
-from porefv.dem.assembly import DEM
+from porefv.dem.dem import DEM
 from porefv.dem.material import Material, Plate
 from porefv.errors import ComputationError, InputError
-from porefv.io.atomic import atomic_write
+from porefv.system.atomic_files import atomic_write
 
-FORMAT, VERSION = "porefv.dem", 1
+FORMAT, VERSION = "porefv.dem", 2
 State = TypeVar("State")
 
-# What a DEM holds between two runs, by attribute. Shapes: n grains, p pairs, k rims, s threads.
+# What a DEM holds between two runs, by attribute. Shapes: n grains, p pairs of grains, k pairs of a grain and a wall,
+# s threads.
 _NUMBERS = {
     "damping": float, "step": float, "time": float, "_slack": float, "_applied_work": float,
     "steps": int, "threads": int,
@@ -47,19 +48,24 @@ _ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "_pairs": ("i4", ("p", 2)),
     "_starts": ("i8", ("n + 1",)),
     "_others": ("i4", ("p",)),
-    "_shares": ("i8", ("s + 1",)),
+    "_grain_ranges": ("i8", ("s + 1",)),
     "_stiffness": ("f8", ("p",)),
     "_shear": ("f8", ("p", 3)),
     "_touching": ("?", ("p",)),
-    "_rims": ("i4", ("k", 2)),
-    "_rim_shares": ("i8", ("s + 1",)),
-    "_rim_stiffness": ("f8", ("k",)),
-    "_rim_shear": ("f8", ("k", 3)),
-    "_rim_touching": ("?", ("k",)),
+    "_wall_pairs": ("i4", ("k", 2)),
+    "_wall_pair_ranges": ("i8", ("s + 1",)),
+    "_wall_pair_stiffness": ("f8", ("k",)),
+    "_wall_pair_shear": ("f8", ("k", 3)),
+    "_wall_pair_touching": ("?", ("k",)),
     "_start": ("f8", ("n", 3)),
     "_wall_start": ("f8", (6,)),
     "_work": ("f8", (3,)),
 }
+# Arrays that version 1 of the format calls by another name.
+_NAMES_OF_VERSION_1 = {
+    "grain_ranges": "shares", "wall_pairs": "rims", "wall_pair_ranges": "rim_shares",
+    "wall_pair_stiffness": "rim_stiffness", "wall_pair_shear": "rim_shear", "wall_pair_touching": "rim_touching",
+}  # fmt: skip
 # Zero between two steps, and made anew.
 _LOADS = ("_loads", "_wall_loads", "_halfway")
 
@@ -237,6 +243,8 @@ def _build(header: dict[str, Any], content: dict[str, np.ndarray]) -> DEM:
     KeyError, TypeError, ValueError
         If something is missing, or is not what it should be.
     """
+    if header["version"] == 1:
+        content = content | {name: content[old] for name, old in _NAMES_OF_VERSION_1.items()}
     dem = DEM.__new__(DEM)
     dem.material = Material(**header["material"])
     dem.plates = {
@@ -246,7 +254,7 @@ def _build(header: dict[str, Any], content: dict[str, np.ndarray]) -> DEM:
         setattr(dem, name, kind(header["numbers"][_key(name)]))
     n = len(content["state"])
     sizes: dict[str | int, int] = {
-        "n": n, "n + 1": n + 1, "s + 1": dem.threads + 1, "p": len(content["pairs"]), "k": len(content["rims"])
+        "n": n, "n + 1": n + 1, "s + 1": dem.threads + 1, "p": len(content["pairs"]), "k": len(content["wall_pairs"])
     }  # fmt: skip
     for name, (dtype, shape) in _ARRAYS.items():
         array = content[_key(name)]

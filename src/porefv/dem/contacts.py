@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.kernels import njit
+from porefv.packing.box import WALL_AXES, WALL_SENSES
+from porefv.system.kernels import njit
 
 # Contacts in a block, and where each quantity's column starts in it: given ...
 _SIZE = 64
@@ -133,25 +134,27 @@ def _hand_out(m, block, pair, grain, others, shear, loads):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def wall_contacts(
-    first, last, state, rims, stiffness, ratio, friction, dt, places, velocities, shear, touching, loads, wall_loads
+    first, last, state, wall_pairs, stiffness, ratio, friction, dt, places, velocities, shear, touching, loads,
+    wall_loads,
 ):  # fmt: skip
-    """Forces between grains and walls, rims (m, 2): grain and wall; returns the energy that sliding dissipates.
+    """Forces between grains and walls; returns the energy that sliding dissipates.
 
-    Wall w is normal to axis w // 2, at places[w] along it, and moves with velocities[w]; wall_loads (6, 4), added to,
-    holds the force on it and the sum of the stiffnesses of its contacts. `friction` (6,) is tan φ. A grain whose
-    centre is beyond a wall gets an infinite load, which stops the motion.
+    `wall_pairs` (m, 2) are the pairs of a grain and a wall that may touch. Wall w is at places[w] along its axis, and
+    moves with velocities[w]; wall_loads (6, 4), added to, holds the force on it and the sum of the stiffnesses of its
+    contacts. `friction` (6,) is tan φ. A grain whose centre is beyond a wall gets an infinite load, which stops the
+    motion.
     """
     block = np.empty(_COLUMNS)
     pair = np.empty(_SIZE, np.int64)
     dissipated = 0.0
     m = 0
     for c in range(first, last):
-        i = rims[c, 0]
-        w = rims[c, 1]
-        axis = w // 2
+        i = wall_pairs[c, 0]
+        w = wall_pairs[c, 1]
+        axis = WALL_AXES[w]
         r = state[i, 3]
         ahead = places[w] - state[i, axis]
-        gap = ahead if w % 2 == 1 else -ahead
+        gap = WALL_SENSES[w] * ahead
         if gap <= 0.0:  # the centre is beyond the wall: nothing pushes it back
             loads[i, axis] = np.inf
             continue
@@ -162,7 +165,7 @@ def wall_contacts(
             continue
         touching[c] = True
         if not (ratio > 0.0 and friction[w] > 0.0):
-            push = stiffness[c] * (r - gap) * (1.0 if w % 2 == 1 else -1.0)
+            push = stiffness[c] * (r - gap) * WALL_SENSES[w]
             loads[i, axis] -= push
             wall_loads[w, axis] += push
             wall_loads[w, 3] += stiffness[c]
@@ -183,20 +186,20 @@ def wall_contacts(
         m += 1
         if m == _SIZE:
             _contact_law(m, dt, block)
-            dissipated += _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads)
+            dissipated += _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads)
             m = 0
     _contact_law(m, dt, block)
-    return dissipated + _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads)
+    return dissipated + _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _hand_to_walls(m, block, pair, rims, stiffness, shear, loads, wall_loads):
+def _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads):
     """Add what a block has found to the loads of its grains and walls."""
     dissipated = 0.0
     for k in range(m):
         c = pair[k]
-        i = rims[c, 0]
-        w = rims[c, 1]
+        i = wall_pairs[c, 0]
+        w = wall_pairs[c, 1]
         for a in range(3):
             shear[c, a] = block[_SHEAR + a * _SIZE + k]
             loads[i, a] += block[_FORCE + a * _SIZE + k]

@@ -14,11 +14,13 @@ from typing import Protocol
 
 import numpy as np
 
-from porefv.dem.assembly import DEM
+from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.errors import ComputationError, InputError
-from porefv.kernels import njit
-from porefv.packing import Box, Packing
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+from porefv.system.kernels import njit
+from porefv.system.number_checks import is_finite_number
 
 # Porosity of the cloud that growth starts from.
 _SPARSE = 0.75
@@ -66,7 +68,7 @@ class UniformSizes:
     ratio: float
 
     def __post_init__(self) -> None:
-        if not (_is_number(self.ratio) and 0.0 < self.ratio <= 1.0):
+        if not (is_finite_number(self.ratio) and 0.0 < self.ratio <= 1.0):
             raise InputError(f"ratio, r_min over r_max, must lie in (0, 1], not {self.ratio!r}")
 
     def draw(self, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -98,11 +100,11 @@ class Grading:
 
     def __post_init__(self) -> None:
         d, f = self.diameters, self.passing
-        if len(d) < 2 or not all(_is_number(x) and x > 0.0 for x in d) or list(d) != sorted(d):
+        if len(d) < 2 or not all(is_finite_number(x) and x > 0.0 for x in d) or list(d) != sorted(d):
             raise InputError(f"diameters must be two or more positive numbers, none below the one before, not {d!r}")
         if len(f) != len(d):
             raise InputError(f"passing must have a fraction for each of the {len(d)} diameters, not {len(f)}")
-        if not all(_is_number(x) for x in f) or list(f) != sorted(f) or f[0] != 0.0 or f[-1] != 1.0:
+        if not all(is_finite_number(x) for x in f) or list(f) != sorted(f) or f[0] != 0.0 or f[-1] != 1.0:
             raise InputError(f"passing must rise from 0.0 to 1.0 (fractions of the mass, not per cent), not {f!r}")
 
     def draw(self, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -122,7 +124,7 @@ class Grading:
 
 
 @dataclass(frozen=True)
-class Moment:
+class PackingState:
     """How far the making of a packing has come.
 
     Attributes
@@ -145,7 +147,7 @@ class Moment:
     unbalanced: float
 
 
-Report = Callable[[Moment], None]
+Report = Callable[[PackingState], None]
 
 
 # ---- a cloud ------------------------------------------------------------------------------------------------------
@@ -296,7 +298,7 @@ def grow(
     unbalanced : float
         `DEM.unbalanced` below which the packing counts as at rest.
     report : callable, optional
-        Called with a `Moment` now and then.
+        Called with a `PackingState` now and then.
     threads : int, optional
         As for `DEM`. The packing is another, as good, for another number of threads.
 
@@ -357,7 +359,7 @@ class _Watch:
         self.strides += 1
         stress = mean_stress(dem)
         if self.report is not None and self.strides % 20 == 0:
-            self.report(Moment(stage, dem.steps, stress, dem.porosity, dem.unbalanced))
+            self.report(PackingState(stage, dem.steps, stress, dem.porosity, dem.unbalanced))
         if dem.steps > self.most:
             raise ComputationError(
                 f"the packing is not at rest after {dem.steps} steps: mean stress {stress:.4g} Pa, porosity "
@@ -475,7 +477,7 @@ def settle(dem: DEM, *, unbalanced: float = 1.0e-3, report: Report | None = None
         `DEM.unbalanced` below which the grains count as at rest, once the kinetic energy of their translation is
         also below a thousandth of what is stored in contacts.
     report : callable, optional
-        Called with a `Moment` now and then.
+        Called with a `PackingState` now and then.
 
     Returns
     -------
@@ -509,10 +511,6 @@ def settle(dem: DEM, *, unbalanced: float = 1.0e-3, report: Report | None = None
 # ---- arguments ----------------------------------------------------------------------------------------------------
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _check_number(n: object) -> None:
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or n < 1:
         raise InputError(f"the number of grains must be a whole number, 1 or more, not {n!r}")
@@ -525,22 +523,22 @@ def _check_seed(seed: object) -> int:
 
 
 def _check_porosity(porosity: object) -> None:
-    if not (_is_number(porosity) and 0.0 < porosity < 1.0):  # type: ignore[operator]
+    if not (is_finite_number(porosity) and 0.0 < porosity < 1.0):  # type: ignore[operator]
         raise InputError(f"porosity must lie between 0 and 1, not {porosity!r}")
 
 
 def _check_unbalanced(unbalanced: object) -> None:
-    if not (_is_number(unbalanced) and 1.0e-8 <= unbalanced < 1.0):  # type: ignore[operator]
+    if not (is_finite_number(unbalanced) and 1.0e-8 <= unbalanced < 1.0):  # type: ignore[operator]
         raise InputError(f"unbalanced must lie between 1e-8 and 1, not {unbalanced!r}")
 
 
 def _check_growth(stress: float | None, porosity: float | None, damping: float, unbalanced: float) -> None:
     if stress is None and porosity is None:
         raise InputError("growth needs a stress in Pa, a porosity, or both")
-    if stress is not None and not (_is_number(stress) and stress > 0.0):
+    if stress is not None and not (is_finite_number(stress) and stress > 0.0):
         raise InputError(f"stress must be a positive number of Pa (compression), not {stress!r}")
     if porosity is not None:
         _check_porosity(porosity)
-    if not (_is_number(damping) and 0.0 < damping < 1.0):
+    if not (is_finite_number(damping) and 0.0 < damping < 1.0):
         raise InputError(f"damping must lie between 0 and 1, not {damping!r}: growth needs some to come to rest")
     _check_unbalanced(unbalanced)

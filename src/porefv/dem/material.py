@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from porefv.errors import InputError
+from porefv.system.number_checks import check_number
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,3 @@ class Plate:
             if self.top_speed is None:
                 raise InputError("a wall with a stress needs a top_speed in m/s")
             check_number(self.top_speed, "top_speed", "a positive speed in m/s", lambda x: x > 0.0)
-
-
-def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
-    """InputError unless the value is a finite number for which that holds."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or not holds(value):
-        raise InputError(f"{name} must be {what}, not {value!r}")

@@ -3,8 +3,8 @@
 Velocities live half a step before positions:
 v(t + dt/2) = v(t - dt/2) + dt F(t) / m,  x(t + dt) = x(t) + dt v(t + dt/2).
 
-Contacts and grains are dealt out to a fixed number of shares, each with load arrays of its own: results then depend
-on the number of shares alone, and one share needs no sums.
+Contacts and grains are divided among a fixed number of ranges, each with load arrays of its own: results then depend on
+the number of ranges alone, and a single range needs no sums.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
-from porefv.kernels import njit, prange
+from porefv.packing.box import WALL_AXES, WALL_SENSES
+from porefv.system.kernels import njit, prange
 
 # Why `advance` came back.
 DONE, CROWDED, RUNAWAY = 0, 1, 2
@@ -23,8 +24,8 @@ WHOLE, FORCES, MOTION = 0, 1, 2
 @njit(cache=True, parallel=True, error_model="numpy")
 def advance(
     steps, half, dt, state, inverse_mass, inverse_inertia, applied, gravity, damping,
-    starts, others, stiffness, shear, touching, shares_of_grains,
-    rims, rim_stiffness, rim_shear, rim_touching, rim_shares,
+    starts, others, stiffness, shear, touching, grain_ranges,
+    wall_pairs, wall_pair_stiffness, wall_pair_shear, wall_pair_touching, wall_pair_ranges,
     ratio, friction, wall_friction,
     places, wall_velocities, targets, top_speeds, gains, wall_yields, wall_thrusts,
     loads, wall_loads, wall_forces, start, wall_start, slack, fastest, work,
@@ -35,8 +36,9 @@ def advance(
     ----------
     half : WHOLE, or FORCES and then MOTION to see the loads before they move anything, of one step
     state, starts, others, stiffness, shear, touching : see `porefv.dem.contacts`
-    rims, rim_stiffness, rim_shear, rim_touching : the same for grains (first column) and walls (second)
-    shares_of_grains, rim_shares (s + 1,) : where each share's grains, with their pairs, and rims start
+    wall_pairs, wall_pair_stiffness, wall_pair_shear, wall_pair_touching : the same for pairs of a grain (first column)
+        and a wall (second)
+    grain_ranges, wall_pair_ranges (s + 1,) : where the grains of each range, with their pairs, and its wall pairs start
     inverse_mass, inverse_inertia (n,) ; applied (n, 3) : force from outside ; gravity (3,)
     damping : part of the acceleration taken off (added on) where it speeds a component of the motion up (slows it)
     places (6,), wall_velocities (6, 3) : of the walls ; targets (6,) : stress servo-controlled walls press with, else
@@ -51,31 +53,32 @@ def advance(
     work (3,) : energies added to: dissipated by sliding, put in by walls, taken by damping
     """
     n = state.shape[0]
-    shares = rim_shares.shape[0] - 1
-    sliding = np.zeros(shares)
-    damped = np.zeros(shares)
-    far = np.zeros(shares)
-    runaway = np.zeros(shares, np.bool_)
-    bounds = np.zeros(shares + 1, np.int64)
-    for s in range(shares + 1):
-        bounds[s] = n * s // shares
+    ranges = wall_pair_ranges.shape[0] - 1
+    sliding = np.zeros(ranges)
+    damped = np.zeros(ranges)
+    far = np.zeros(ranges)
+    runaway = np.zeros(ranges, np.bool_)
+    bounds = np.zeros(ranges + 1, np.int64)
+    for s in range(ranges + 1):
+        bounds[s] = n * s // ranges
     for step in range(steps):
         if half != MOTION:
-            for s in prange(shares):
+            for s in prange(ranges):
                 sliding[s] = grain_contacts(
-                    shares_of_grains[s], shares_of_grains[s + 1], state, starts, others, stiffness, ratio, friction,
+                    grain_ranges[s], grain_ranges[s + 1], state, starts, others, stiffness, ratio, friction,
                     dt, shear, touching, loads[s],
                 )  # fmt: skip
                 sliding[s] += wall_contacts(
-                    rim_shares[s], rim_shares[s + 1], state, rims, rim_stiffness, ratio, wall_friction, dt,
-                    places, wall_velocities, rim_shear, rim_touching, loads[s], wall_loads[s],
+                    wall_pair_ranges[s], wall_pair_ranges[s + 1], state, wall_pairs, wall_pair_stiffness, ratio,
+                    wall_friction, dt, places, wall_velocities, wall_pair_shear, wall_pair_touching, loads[s],
+                    wall_loads[s],
                 )  # fmt: skip
             work[0] += sliding.sum()
             _weigh_walls(dt, places, targets, top_speeds, gains, wall_loads, wall_forces, wall_yields)
         if half == FORCES:
             return 0, DONE
         _move_walls(dt, places, wall_velocities, targets, wall_yields, wall_thrusts, wall_forces, work)
-        for s in prange(shares):
+        for s in prange(ranges):
             damped[s], far[s], runaway[s] = _move(
                 bounds[s], bounds[s + 1], dt, state, loads, inverse_mass, inverse_inertia, applied, gravity, damping,
                 start, fastest,
@@ -88,7 +91,7 @@ def advance(
 
 @njit(cache=True, nogil=True)
 def _look(damped, far, runaway, places, wall_start, slack, work):
-    """Add up what the shares have found; whether to go on."""
+    """Add up what the ranges have found; whether to go on."""
     farthest = 0.0
     lost = False
     for s in range(far.shape[0]):
@@ -198,12 +201,11 @@ def _weigh_walls(dt, places, targets, top_speeds, gains, wall_loads, wall_forces
 @njit(cache=True, nogil=True)
 def wall_excess(w, places, targets, wall_forces):
     """Outward force on wall w beyond the stress it presses with; NaN where that is not given."""
-    axis = w // 2
+    axis = WALL_AXES[w]
     b = 2 * ((axis + 1) % 3)
     c = 2 * ((axis + 2) % 3)
     section = (places[b + 1] - places[b]) * (places[c + 1] - places[c])
-    sense = 1.0 if w % 2 == 1 else -1.0
-    return sense * wall_forces[w, axis] - targets[w] * section
+    return WALL_SENSES[w] * wall_forces[w, axis] - targets[w] * section
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -212,8 +214,8 @@ def _move_walls(dt, places, velocities, targets, yields, thrusts, wall_forces, w
     for w in range(6):
         if not np.isnan(targets[w]):
             outward = yields[w] * (wall_excess(w, places, targets, wall_forces) + thrusts[w])
-            velocities[w, w // 2] = outward if w % 2 == 1 else -outward
+            velocities[w, WALL_AXES[w]] = WALL_SENSES[w] * outward
     for w in range(6):
-        places[w] += dt * velocities[w, w // 2]
+        places[w] += dt * velocities[w, WALL_AXES[w]]
         for a in range(3):  # the wall does the opposite of what is done on it
             work[1] -= wall_forces[w, a] * velocities[w, a] * dt

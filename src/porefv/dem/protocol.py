@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from porefv.packing import Box
+from porefv.packing.box import Box
 
 
 @runtime_checkable
@@ -55,7 +55,7 @@ class GrainModel(Protocol):
         ...
 
     @property
-    def slots(self) -> np.ndarray:
+    def rows(self) -> np.ndarray:
         """(n,): row of each grain in the arrays of `predict` and `correct`; 0 ... n - 1 where they are in order."""
         ...
 

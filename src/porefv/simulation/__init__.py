@@ -2,25 +2,23 @@
 
 In Python::
 
-    from porefv.simulation import SimulationScene, read_series
+    from porefv import simulation
+    from porefv.scenes import SimulationScene
 
-    directory = SimulationScene.read("data/scenes/oedometer.toml").run()
-    series = read_series(directory)
+    directory = simulation.run(SimulationScene.read("data/scenes/oedometer.toml"))
+    series = simulation.read_series(directory)
     series["time"], series["mean_pressure"]
 """
 
-from importlib import import_module
-from typing import Any
+from porefv.system.lazy_exports import lazy_exports
 
-_HOME = {
-    "SimulationScene": "scene",
-    "read_profiles": "series",
-    "read_series": "series",
-}
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"porefv.simulation.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'porefv.simulation' has no attribute {name!r}")
+__all__ = ["check", "read_profiles", "read_series", "run"]
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "check": "porefv.simulation.simulate",
+        "read_profiles": "porefv.simulation.series",
+        "read_series": "porefv.simulation.series",
+        "run": "porefv.simulation.simulate",
+    },
+)

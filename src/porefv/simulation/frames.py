@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from porefv.coupling import Coupling
-from porefv.dem import DEM, Trajectory
-from porefv.dem.trajectory import write_list
-from porefv.io.atomic import atomic_write
+from porefv.coupling.coupling import Coupling
+from porefv.dem.dem import DEM
+from porefv.export.trajectories import Trajectory, write_list
+from porefv.export.vtk_datasets import cells_grid
+from porefv.export.vtk_files import write_xml
+from porefv.system.atomic_files import atomic_write
 
 # Time of each frame of the pores, by its step.
 PoreFrames = dict[int, float]
@@ -32,8 +34,6 @@ class Frames:
 
     def write(self, dem: DEM, coupling: Coupling | None) -> None:
         """Add a frame of the grains, and of the pores where there is a fluid."""
-        from porefv.vtk_mesh import cells_grid, write_xml
-
         self._grains.write()
         if coupling is not None:
             mesh = coupling.mesh

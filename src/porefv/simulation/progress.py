@@ -6,11 +6,11 @@ import math
 import time
 from dataclasses import dataclass
 
-from porefv.progress import Progress
+from porefv.system.progress import Progress
 
 
 @dataclass(frozen=True)
-class Moment:
+class RunState:
     """State of a run.
 
     Attributes
@@ -35,7 +35,7 @@ class Moment:
 class SimulationProgress(Progress):
     """Progress that shows simulated time, what remains by the clock, energy and imbalance."""
 
-    moment: Moment | None = None
+    state: RunState | None = None
     _start: tuple[float, float] | None = None
 
     @property
@@ -45,16 +45,16 @@ class SimulationProgress(Progress):
 
     def begin(self) -> None:
         """A stage begins: time that remains is told from what it takes."""
-        self.moment = self._start = None
+        self.state = self._start = None
 
-    def show(self, moment: Moment) -> None:
-        """Take a moment to be drawn."""
+    def show(self, state: RunState) -> None:
+        """Take a state to be drawn."""
         if self._start is None:
-            self._start = (time.perf_counter(), moment.time)
-        self.moment = moment
+            self._start = (time.perf_counter(), state.time)
+        self.state = state
 
     def _line(self, name: str, seconds: float) -> str:
-        now = self.moment
+        now = self.state
         if now is None or self._start is None:
             return super()._line(name, seconds)
         # Not above 80 columns: what is beyond is cut off.

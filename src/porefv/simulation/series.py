@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from porefv.errors import InputError, MissingExtraError
-from porefv.io.atomic import atomic_write
+from porefv.system.atomic_files import atomic_write
 
 SERIES, PROFILES, PARQUET = "series.csv", "profiles.csv", "series.parquet"
 

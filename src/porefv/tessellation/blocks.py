@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import get_num_threads
 
-from porefv import memory
-from porefv.kernels import njit
+from porefv.packing.memory_estimate import ensure_room_for_cells
+from porefv.system.kernels import njit
 from porefv.tessellation import insertion
 from porefv.tessellation.ordering import rounds
 
@@ -79,7 +79,7 @@ def _build(n, points, weights, extent):
         )  # fmt: skip
         if done == n:
             break
-        memory.ensure_cells(len(cells))
+        ensure_room_for_cells(len(cells))
         cells, neighbours, planes, bounds, marks, ends, free = (
             np.concatenate([a, np.zeros_like(a)]) for a in (cells, neighbours, planes, bounds, marks, ends, free)
         )

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.kernels import njit
+from porefv.system.kernels import njit
 
 _SPLITTER = 134217729.0  # 2**27 + 1 cuts a double in two halves of 26 bits
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.doubling import doubled
-from porefv.kernels import njit
+from porefv.system.growing_arrays import doubled
+from porefv.system.kernels import njit
 from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, power_centre, row, side
 
 # Relative error of a power centre beyond which it is computed again in exact arithmetic.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.kernels import njit
+from porefv.system.kernels import njit
 
 _BITS = 20
 

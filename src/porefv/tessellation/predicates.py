@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.kernels import njit
+from porefv.system.kernels import njit
 from porefv.tessellation.expansions import add, estimate, multiply, sign, two_product, two_sum
 
 EPSILON = 2.0**-53

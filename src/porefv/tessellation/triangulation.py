@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from porefv.errors import ComputationError
-from porefv.kernels import njit
-from porefv.packing import Box
+from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES, Box
+from porefv.system.kernels import njit
 from porefv.tessellation.blocks import triangulate
 from porefv.tessellation.ordering import morton_codes
 
@@ -54,9 +54,8 @@ class RegularTriangulation:
         weights = np.empty(n + 6)
         np.multiply(centres - self.origin, scale, out=points[:n])
         np.multiply(radii, scale, out=weights[:n])
-        points[n:] = wall_normals()
-        weights[n + 0 :: 2] = -(box.lower - self.origin) * scale
-        weights[n + 1 :: 2] = (box.upper - self.origin) * scale
+        points[n:] = WALL_NORMALS
+        weights[n:] = wall_offsets(box, self.origin) * scale
         # Products of five coordinates must not underflow for the predicates to be exact.
         smallest = np.abs(points[:n][points[:n] != 0.0]).min(initial=1.0)
         if min(smallest, weights[:n].min()) < 2.0**-140:
@@ -90,12 +89,9 @@ class RegularTriangulation:
         return f"RegularTriangulation({self.n_spheres} spheres{hidden}, {len(self.cells)} cells)"
 
 
-def wall_normals() -> np.ndarray:
-    """(6, 3) outward unit normals of the walls, in the order x_min, x_max, y_min, ..."""
-    normals = np.zeros((6, 3))
-    for wall in range(6):
-        normals[wall, wall // 2] = 1.0 if wall % 2 else -1.0
-    return normals
+def wall_offsets(box: Box, origin: np.ndarray) -> np.ndarray:
+    """(6,) offset of each wall along its outward normal from an origin [m]."""
+    return WALL_SENSES * (box.wall_places - origin[WALL_AXES])
 
 
 def exact_origin(box: Box) -> np.ndarray:
@@ -119,6 +115,5 @@ def _vertices(cells, planes, n, weights, length):
         for i in range(4):
             wall = cells[t, i] - n
             if wall >= 0:
-                offset = weights[n + wall] * length
-                vertices[t, wall // 2] = offset if wall % 2 else -offset
+                vertices[t, WALL_AXES[wall]] = WALL_SENSES[wall] * (weights[n + wall] * length)
     return vertices

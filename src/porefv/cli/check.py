@@ -1,0 +1,90 @@
+"""The command `porefv check`: validate a scene and its packing without computing."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from porefv.cli.text import count_text, path_text, range_text, rows_text, vector_text, walls_text
+
+if TYPE_CHECKING:
+    from porefv.packing.packing import Packing
+    from porefv.scenes.flow_scene import FlowScene
+
+
+def register(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("check", help="validate a scene and its packing without computing")
+    parser.add_argument("scene", metavar="SCENE.toml", type=Path)
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command."""
+    from porefv.cli.compilation import announce_compilation_of_flow
+    from porefv.scenes.table import Table
+    from porefv.system.progress import Progress
+
+    progress = Progress()
+    announce_compilation_of_flow(progress)
+    keys = Table.read(options.scene).data
+    if "stages" in keys:
+        from porefv.cli import simulate
+        from porefv.scenes.simulation_scene import SimulationScene
+        from porefv.simulation.simulate import check
+
+        simulation = SimulationScene.read(options.scene)
+        with progress.stage("validation"):
+            grains = check(simulation)
+        print(simulate.scene_text(simulation, grains))
+    elif "grains" in keys:
+        from porefv.cli import pack
+        from porefv.scenes.packing_scene import PackingScene
+
+        print(pack.scene_text(PackingScene.read(options.scene)))
+    else:
+        from porefv.scenes.flow_scene import FlowScene
+
+        scene = FlowScene.read(options.scene)
+        with progress.stage("validation"):
+            packing = scene.check()
+        print(scene_text(scene, packing))
+
+
+def scene_text(scene: FlowScene, packing: Packing) -> str:
+    """What a scene asks for, and the packing it is about."""
+    from porefv.packing.box import WALLS
+    from porefv.packing.memory_estimate import required
+    from porefv.system.memory import available
+
+    overlaps = packing.overlaps
+    box = packing.box
+    assert box is not None  # the scene has seen to it
+    walls = {name: vars(wall) for name, wall in zip(WALLS, scene.walls, strict=True)}
+    fluid, flow, output = scene.fluid, scene.flow, scene.output
+    asked = ", ".join(output.quantities) or "the pores alone"
+    directory = output.directory
+    exists = " (exists: solve needs --force)" if directory.is_dir() and any(directory.iterdir()) else ""
+    rows = [
+        (
+            "packing",
+            f"{path_text(scene.packing.file)}: {count_text(len(packing))} spheres, radii {range_text(packing.radii)} m",
+        ),
+        (
+            "overlaps",
+            f"{count_text(len(overlaps.pairs))} pairs of spheres, {count_text(len(overlaps.wall_ids))} across walls",
+        ),
+        ("box", f"{vector_text(box.lower)} to {vector_text(box.upper)} m"),
+        ("fluid", f"viscosity {fluid.viscosity:g} Pa s, density {fluid.density:g} kg/m³"),
+        ("walls", walls_text(walls)),
+        ("flow", f"{flow.conductance.name}, solver {flow.solver}, gravity {vector_text(flow.gravity)} m/s²"),
+        (
+            "output",
+            f"{asked}{'; VTK files' if output.vtk else ''}, in {path_text(directory)}{exists}",
+        ),
+    ]
+    free = available()
+    needed = f"about {required(len(packing)) / 2**30:.1f} GiB at the most"
+    rows.append(("memory", needed if free is None else f"{needed}, {free / 2**30:.1f} GiB free"))
+    return "\n".join([f"{path_text(scene.path or 'scene')} is sound", *rows_text(rows)])

@@ -1,0 +1,127 @@
+"""The command `porefv info`: print a summary of results."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from porefv.cli.text import count_text, path_text, range_text, rows_text, vector_text, walls_text
+from porefv.errors import InputError
+
+if TYPE_CHECKING:
+    from porefv.results.reading import Results
+
+
+def register(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("info", help="print a summary of results")
+    parser.add_argument("results", metavar="RESULTS", type=Path)
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command."""
+    from porefv.results.reading import read
+    from porefv.simulation.run_record import is_simulation, read_record
+
+    if is_simulation(options.results):
+        from porefv.cli.simulate import outcome_text
+
+        print(outcome_text(read_record(options.results), options.results))
+    else:
+        print(summary_text(read(options.results)))
+
+
+def summary_text(results: Results) -> str:
+    """The numbers of a results directory, in paragraphs.
+
+    Raises
+    ------
+    InputError
+        If the summary lacks what every summary has.
+    """
+    try:
+        return _summary_text(results)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise InputError(f"{results.directory}: summary.json is damaged: {reason}. Solve again.") from None
+
+
+def _summary_text(results: Results) -> str:
+    summary = results.summary
+    packing, mesh, unusual = summary["packing"], summary["mesh"], summary.get("unusual", {})
+    paragraphs: list[tuple[str, list[tuple[str, Any]]]] = [
+        ("Packing", [
+            ("file", packing["file"] and path_text(packing["file"])),
+            ("box", f"{vector_text(packing['box']['lower'])} to {vector_text(packing['box']['upper'])} m"),
+            ("spheres", f"{count_text(packing['spheres'])}, radii {range_text(packing['radii'])} m"),
+            ("hidden spheres", packing["hidden_spheres"] or None),
+            ("overlapping pairs", count_text(packing['overlapping_pairs'])),
+            ("porosity", f"{packing['porosity']:.6g}"),
+            ("porosity error", _bound(packing["porosity_error"], "too high, where three spheres meet")),
+            ("pore volume", f"{packing['pore_volume']:.6g} m³"),
+        ]),
+        ("Pores", [
+            ("pores", f"{count_text(mesh['pores'])} ({count_text(mesh['united_pores'])} united with another)"),
+            ("throats", count_text(mesh['throats'])),
+            *((name.replace("_", " "), count_text(count)) for name, count in unusual.items() if count),
+        ]),
+        ("Flow", _flow_rows(summary)),
+        ("Forces on the spheres", _force_rows(summary)),
+        ("Computation", [
+            *_solver_rows(summary),
+            ("time", ", ".join(f"{stage} {time:.2f}" for stage, time in summary["seconds"].items()) + " s"),
+            ("versions", ", ".join(f"{name} {number}" for name, number in summary["versions"].items())),
+        ]),
+    ]  # fmt: skip
+    lines = [
+        f"{path_text(results.directory)}: {summary['scene'] and path_text(summary['scene'])}, {summary['created']}"
+    ]
+    for title, rows in paragraphs:
+        if rows:
+            lines += ["", title, *rows_text(rows)]
+    return "\n".join(lines)
+
+
+def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    if "flow" not in summary:
+        return []
+    flow, fluid = summary["flow"], summary["fluid"]
+    rows = [
+        ("fluid", f"viscosity {fluid['viscosity']:g} Pa s, density {fluid['density']:g} kg/m³"),
+        ("walls", walls_text(summary["walls"])),
+        ("conductance", flow["conductance"]),
+        ("inflow", f"{flow['inflow']:.6g} m³/s"),
+        ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
+    ]
+    if "permeability" in summary:
+        rows += [
+            ("permeability", f"{summary['permeability']:.6g} m²"),
+            ("hydraulic conductivity", f"{summary['hydraulic_conductivity']:.6g} m/s"),
+        ]
+    return rows
+
+
+def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    if "forces" not in summary:
+        return []
+    sums = summary["forces"]["sums"]
+    rows = [(part, f"({vector_text(sums[part])}) N") for part in ("pressure", "viscous", "buoyancy", "total")]
+    rows.append(("walls, total", f"({vector_text(sums['wall_total'])}) N"))
+    rows.append(("force balance", f"{summary['forces']['conservation_residual']:.1e}"))
+    return rows
+
+
+def _bound(error: float | None, of_what: str) -> str | None:
+    return f"at most {error:.1e} {of_what}" if error else None
+
+
+def _solver_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    if "solver" not in summary:
+        return []
+    solver = summary["solver"]
+    unknowns, iterations = f"{count_text(solver['unknowns'])} unknowns", f"{solver['iterations']} iterations"
+    return [("solver", f"{solver['name']}, {unknowns}, {iterations}, imbalance {solver['imbalance']:.1e}")]

@@ -1,0 +1,32 @@
+"""The command `porefv plot`: draw results."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def register(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("plot", help="draw results: grains and pores of solve, time series of simulate")
+    parser.add_argument("results", metavar="RESULTS", type=Path)
+    parser.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command."""
+    from porefv.simulation.run_record import is_simulation
+    from porefv.system.progress import Progress
+
+    with Progress().stage("drawing"):
+        if is_simulation(options.results):
+            from porefv.simulation.series_picture import draw_series
+
+            draw_series(options.results, options.out)
+        else:
+            from porefv.results.drawing import draw
+            from porefv.results.reading import read
+
+            draw(read(options.results), options.out)

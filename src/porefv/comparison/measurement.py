@@ -1,0 +1,93 @@
+"""What a method finds on a scene, and the time and memory that it takes.
+
+Each method is computed in a process of its own: its memory is that of no other.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from porefv.comparison.methods import Method
+from porefv.conductance.registry import conductance_model
+from porefv.scenes.flow_scene import FlowScene
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """What a method finds and what it takes.
+
+    Attributes
+    ----------
+    method : Method
+    permeability : float
+        NaN unless the walls drive flow along one axis [m²].
+    forces : (n, 3) array
+        Pressure and viscous forces on the spheres [N].
+    seconds : float
+        From the packing in memory to the forces.
+    memory : int
+        Most that the process held, less what it held before it began [B].
+    """
+
+    method: Method
+    permeability: float
+    forces: np.ndarray
+    seconds: float
+    memory: int
+
+
+def measure(scene_file: Path, method: Method) -> MethodResult:
+    """Compute a scene by a method, once to compile or load what it needs and then for the clock."""
+    scene = FlowScene.read(scene_file)
+    if method.conductance is None:
+        return _resolve(scene, method)
+    model = scene.flow.conductance
+    if method.conductance != model.name:
+        model = conductance_model(method.conductance)
+    options = replace(scene.flow, conductance=model, solver=method.solver, tolerance=method.tolerance)
+    scene = replace(scene, flow=options)
+    packing = scene.read_packing()
+
+    def run() -> tuple[float, np.ndarray]:
+        flow = scene.pore_flow(scene.pore_mesh(packing))
+        forces = flow.forces.pressure + flow.forces.viscous
+        return (flow.permeability if flow.walls.axis is not None else float("nan")), forces
+
+    run()
+    before = _held()
+    begin = time.perf_counter()
+    permeability, forces = run()
+    return MethodResult(method, permeability, forces, time.perf_counter() - begin, max(_most_held() - before, 0))
+
+
+def _resolve(scene: FlowScene, method: Method) -> MethodResult:
+    from porefv.resolved.refinement import Options, stokes_reference
+
+    mesh = scene.pore_mesh()
+    before = _held()
+    begin = time.perf_counter()
+    found = stokes_reference(mesh, scene.walls, scene.fluid.viscosity, Options(single=True))
+    seconds = time.perf_counter() - begin
+    return MethodResult(method, found.permeability, found.values.sphere_total, seconds, _most_held() - before)
+
+
+def _most_held() -> int:
+    """Largest resident size of this process so far [B]."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def _held() -> int:
+    """Resident size of this process now [B]; the largest so far where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return _most_held()
+    return pages * os.sysconf("SC_PAGE_SIZE")

@@ -1,0 +1,349 @@
+"""CoupledPressure: the pressure of the pores while grains move, (G + E D Eᵀ) p = Q - E ẋ*, on one mesh (C14 eq. 25-28).
+
+ẋ* are the velocities that grains and walls would have after the step without the fluid, D what a force over the step
+adds to them: dt / m for a grain. With D = 0 and velocities of half a step ago this is the step of C14.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.coupling.exchange import Exchange, gather, spread
+from porefv.errors import ComputationError
+from porefv.flow.flux import net_outflows, wall_face_fluxes
+from porefv.flow.pressure import held_pressures
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALL_AXES
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.network import Network
+from porefv.solvers.pressure_equation import free_network, reached
+from porefv.solvers.solver import Solver, SparseFactor
+from porefv.system.kernels import njit
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+# Part of the drag, lumped on throats, that the preconditioner knows of.
+_LUMPED = 0.3
+_MOST_ITERATIONS = 2000
+# Drag that rules the matrix by this factor takes iterations in hundreds: up to so many unknowns factorise it instead.
+_RULING, _FACTORED = 300.0, 15_000
+
+
+@dataclass(frozen=True)
+class Power:
+    """Where the power of the fluid goes [W].
+
+    Attributes
+    ----------
+    grains, walls : float
+        Work of the fluid on grains and walls, a second.
+    dissipation : float
+        In throats, Σ q² / K.
+    boundary : float
+        Work of the imposed pressures on what flows in.
+    """
+
+    grains: float
+    walls: float
+    dissipation: float
+    boundary: float
+
+    @property
+    def imbalance(self) -> float:
+        """What is lost or made of nothing, relative to the largest."""
+        largest = max(abs(self.grains), abs(self.walls), self.dissipation, abs(self.boundary))
+        lost = self.boundary - self.dissipation - self.grains - self.walls
+        return abs(lost) / largest if largest > 0.0 else 0.0
+
+
+class CoupledPressure:
+    """The pressure equation of pores whose grains move, on one mesh.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    exchange : Exchange
+    conductances : (t,) array
+        K of each throat [m³/(Pa s)].
+    pressures : (6,) array
+        Imposed on walls, NaN where impervious [Pa].
+    mobilities : (n,) array
+        D of each grain, by row; zero for a step that is explicit in the drag [m/(s N)].
+    """
+
+    def __init__(
+        self,
+        mesh: PoreMesh,
+        exchange: Exchange,
+        conductances: np.ndarray,
+        pressures: np.ndarray,
+        mobilities: np.ndarray,
+    ):
+        self.mesh, self.exchange, self.conductances, self.mobilities = mesh, exchange, conductances, mobilities
+        self.free = np.isnan(held_pressures(mesh, pressures))
+        number = np.where(self.free, np.cumsum(self.free) - 1, -1).astype(np.int32)
+        self._node = number[mesh.cell_pore]
+        self._of_free = exchange.between(self._node)
+        self._of_held = exchange.between(np.where(self._node < 0, mesh.cell_pore, -1))
+        free = int(np.count_nonzero(self.free))
+        self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
+        faces = mesh.wall_faces
+        self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
+        # What walls yielded when the factor was made; empty before.
+        self.factor_mobilities = np.zeros(0)
+        self._factor: ApproximateCholesky | SparseFactor | None = None
+        self.set_pressures(pressures)
+
+    def set_pressures(self, pressures: np.ndarray) -> None:
+        """Change the pressures (6,) imposed on walls; which walls have one, stays."""
+        mesh = self.mesh
+        self.wall_pressures = pressures
+        self._held = np.nan_to_num(held_pressures(mesh, pressures))
+        pairs = mesh.throats.pores
+        self.network, self._inflow = free_network(
+            pairs, self.conductances, self._held, self.free, np.zeros(mesh.n_pores)
+        )
+        self._weights = 1.0 / self.network.diagonal
+        self._starts, self._columns = self.network.starts.astype(np.uint32), self.network.columns.astype(np.uint32)
+        self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
+        self._of_held.spread(self._held, self._held_forces)
+
+    # ---- solving ------------------------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        velocities: np.ndarray,
+        wall_mobilities: np.ndarray,
+        guess: np.ndarray,
+        tolerance: float,
+        product: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Pressures of the free pores, their product with the matrix, and iterations.
+
+        Parameters
+        ----------
+        velocities : (n + 6, 3) array
+            ẋ* of grains, by row, and of walls [m/s].
+        wall_mobilities : (6,) array
+            D of walls along their normals [m/(s N)].
+        guess : (n_free,) array
+            Where to start [Pa].
+        tolerance : float
+            Bound on the error of the pressures, relative, in the norm √(pᵀ (G + E D Eᵀ) p): that of power.
+        product : (n_free,) array, optional
+            (G + E D Eᵀ) × guess, where it is known [m³/s].
+
+        Raises
+        ------
+        ComputationError
+            If it is not reached.
+        """
+        if self._factor is None:
+            if len(self.factor_mobilities) == 0:
+                self.factor_mobilities = wall_mobilities.copy()
+            self._factor = self._make_factor(self.factor_mobilities)
+        moved = velocities.copy()
+        _yield(self._held_forces, self.mobilities, wall_mobilities, moved)
+        rhs = np.zeros(len(self.network))
+        self._of_free.gather(moved, rhs)
+        np.subtract(self._inflow, rhs, out=rhs)
+        x = guess.copy()
+        q, aq, z, room = self._room
+        arguments = (
+            self._of_free.rows, self._of_free.gradients, self._of_free.nodes, self._starts, self._columns,
+            self.network.links, self.network.leaks, self.mobilities, wall_mobilities, self._room_for_forces,
+        )  # fmt: skip
+        if product is None:
+            _multiply(*arguments, x, aq)
+            product = aq
+        r = rhs - product
+        size = _weighted_square(r, self._weights)
+        rz = self._factor.apply(r, z, room)
+        q[:] = z
+        iterations = 0
+        # The factor stands for the matrix: r·z is its estimate of the power still wrong, x·b that of the power.
+        while rz > tolerance**2 * abs(_dot(x, rhs)) and iterations < _MOST_ITERATIONS:
+            iterations += 1
+            _advance(x, r, q, aq, rz / _multiply(*arguments, q, aq))
+            before, size = size, _weighted_square(r, self._weights)
+            if rz * size / before <= tolerance**2 * abs(_dot(x, rhs)):
+                # By the diagonal so much less is left that the factor, which costs most, need not be asked.
+                return x, rhs - r, iterations
+            new = self._factor.apply(r, z, room)
+            _redirect(q, z, new / rz)
+            rz = new
+        if not rz <= max(tolerance**2 * abs(_dot(x, rhs)), 1e-300):
+            raise ComputationError(
+                f"the pressures of moving pores were not found in {iterations} iterations; a larger tolerance, or a "
+                "smaller contrast of grain sizes, makes it easier"
+            )
+        return x, rhs - r, iterations
+
+    def is_steady(self, wall_mobilities: np.ndarray) -> bool:
+        """Whether the matrix stays as it is from step to step: no wall with free pores on it yields."""
+        return not wall_mobilities[self._walls_of_free].any()
+
+    def _make_factor(self, wall_mobilities: np.ndarray) -> ApproximateCholesky | SparseFactor:
+        """Of the matrix itself where drag rules it, else of the network with a part of the drag in its throats."""
+        mesh = self.mesh
+        drags = np.zeros(mesh.n_spheres + 6)
+        rows = self.exchange.rows[: mesh.n_cells]  # of the cells themselves; the others are for their neighbours
+        drags[mesh.cells.ravel()] = np.append(self.mobilities, np.zeros(6))[rows.ravel()]
+        vertices = mesh.facets.vertices[mesh.throats.first_facets]
+        drag = drags[vertices].sum(axis=1) * (mesh.throats.areas / 3.0) ** 2
+        nothing = np.zeros(mesh.n_pores)
+        weights = self.conductances + _LUMPED * drag
+        network, _ = free_network(mesh.throats.pores, weights, nothing, self.free, nothing)
+        # Walls yield to the pressure on all of them: what each face has of it, lumped.
+        faces = mesh.wall_faces
+        node = self._node[faces.cells]
+        yielding = faces.areas * (wall_mobilities * mesh.box.wall_areas)[faces.walls]
+        leaks = np.bincount(node[node >= 0], yielding[node >= 0], len(network))
+        if not (leaks.any() or network.leaks.any()):  # pressures are defined up to a constant: any will do
+            leaks[0] = network.diagonal[0]
+        if len(network) <= _FACTORED and np.median(drag) > _RULING * np.median(self.conductances):
+            return SparseFactor(self._matrix(leaks))
+        leaks, diagonal = network.leaks + leaks, network.diagonal + leaks
+        return ApproximateCholesky.of(Network(network.starts, network.columns, network.links, leaks, diagonal))
+
+    def _matrix(self, leaks: np.ndarray) -> sparse.csr_array:
+        """G + E D Eᵀ of the grains, between free pores, and further leaks: pores couple through every grain."""
+        from scipy import sparse
+
+        n, free = len(self.mobilities), self._of_free
+        columns = (3 * free.rows.astype(np.int64)[:, :, None] + np.arange(3)).ravel()
+        rows = np.repeat(free.nodes.astype(np.int64), 12)
+        shape = len(self.network), 3 * (n + 6)
+        operator = sparse.csr_array((free.gradients.ravel(), (rows, columns)), shape=shape)
+        mobilities = np.repeat(np.append(self.mobilities, np.zeros(6)), 3)
+        drag = operator @ sparse.diags_array(mobilities) @ operator.T
+        return (drag + sparse.diags_array(leaks) + self.network.to_matrix()).tocsr()
+
+    # ---- what follows from the pressures ------------------------------------------------------------------------
+
+    def full(self, pressure: np.ndarray) -> np.ndarray:
+        """(n_pores,): pressures of all pores, from those of the free ones [Pa]."""
+        full = self._held.copy()
+        full[self.free] = pressure
+        return full
+
+    def forces(self, pressure: np.ndarray) -> np.ndarray:
+        """(n + 6, 3): force on grains, by row, and walls, from the pressures of the free pores [N]."""
+        forces = self._held_forces.copy()
+        self._of_free.spread(pressure, forces)
+        return forces
+
+    def wall_fluxes(self, pressure: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """(6,): flux into the sample through each wall, grains and walls moving with (n + 6, 3) [m³/s]."""
+        mesh, full = self.mesh, self.full(pressure)
+        i, j = mesh.throats.pores.T
+        outflows = net_outflows(mesh, self.conductances * (full[i] - full[j]))
+        self.exchange.between(mesh.cell_pore).gather(velocities, outflows)  # and the rate at which each pore swells
+        held = ~np.isnan(self.wall_pressures)
+        return np.bincount(mesh.wall_faces.walls, wall_face_fluxes(mesh, outflows, held), 6)
+
+    def power(self, pressure: np.ndarray, velocities: np.ndarray) -> Power:
+        """Where the power goes, grains and walls moving with (n + 6, 3)."""
+        forces = self.forces(pressure)
+        work = (forces * velocities).sum(axis=1)
+        full = self.full(pressure)
+        i, j = self.mesh.throats.pores.T
+        dissipation = (self.conductances * (full[i] - full[j]) ** 2).sum()
+        fluxes = self.wall_fluxes(pressure, velocities)
+        boundary = np.dot(fluxes, np.nan_to_num(self.wall_pressures))
+        return Power(float(work[:-6].sum()), float(work[-6:].sum()), float(dissipation), float(boundary))
+
+    @property
+    def cut_off(self) -> int:
+        """Number of free pores from which no throat leads out."""
+        return int(np.count_nonzero(~reached(self.mesh.throats.pores, self.conductances, ~self.free)))
+
+    def drag_number(self, mobilities: np.ndarray, enough: float = np.inf) -> float:
+        """Largest eigenvalue of D Eᵀ G⁻¹ E, to 1 %, for these mobilities (n,); a lower bound where that is `enough`.
+
+        A step that is explicit in the drag is stable up to 2.
+        """
+        solver = Solver(self.network)
+        moves = np.zeros((len(mobilities) + 6, 3))
+        moves[:-6] = np.random.default_rng(0).normal(size=(len(mobilities), 3))
+        root = np.sqrt(mobilities)[:, None]
+        largest = 0.0
+        for _ in range(100):
+            rates = np.zeros(len(self.network))
+            self._of_free.gather(moves, rates)
+            forces = np.zeros_like(moves)
+            pressure, _ = solver.solve(rates, 1e-4)
+            self._of_free.spread(pressure, forces)
+            size = float(np.sqrt((moves[:-6] ** 2 / root**2).sum()))
+            before, largest = largest, float(np.sqrt((forces[:-6] ** 2 * root**2).sum())) / size
+            if abs(largest - before) <= 1e-3 * largest or largest > enough:
+                break
+            moves[:-6] = root**2 * forces[:-6] / largest
+        return largest
+
+
+@njit(cache=True, nogil=True)
+def _yield(forces, mobilities, wall_mobilities, moves):
+    """moves += D forces; walls yield along their normals alone."""
+    n = mobilities.shape[0]
+    for k in range(n):
+        for axis in range(3):
+            moves[k, axis] += mobilities[k] * forces[k, axis]
+    for w in range(6):
+        moves[n + w, WALL_AXES[w]] += wall_mobilities[w] * forces[n + w, WALL_AXES[w]]
+
+
+@njit(cache=True, nogil=True)
+def _multiply(rows, gradients, nodes, starts, columns, links, leaks, mobilities, wall_mobilities, forces, q, aq):
+    """aq = (G + E D Eᵀ) q; returns q·aq. `forces`, (n + 6, 3), is room to work in."""
+    n = mobilities.shape[0]
+    forces[:] = 0.0
+    spread(rows, gradients, nodes, q, forces)
+    for k in range(n):
+        for axis in range(3):
+            forces[k, axis] *= mobilities[k]
+    for w in range(6):
+        for axis in range(3):
+            forces[n + w, axis] *= wall_mobilities[w] if axis == WALL_AXES[w] else 0.0
+    for i in range(q.shape[0]):
+        total = leaks[i] * q[i]
+        for k in range(starts[i], starts[i + 1]):
+            total += links[k] * (q[i] - q[columns[k]])
+        aq[i] = total
+    gather(rows, gradients, nodes, forces, aq)
+    return _dot(q, aq)
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _dot(a, b):
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _weighted_square(r, weights):
+    total = 0.0
+    for i in range(r.shape[0]):
+        total += weights[i] * r[i] * r[i]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _advance(x, r, q, aq, alpha):
+    """x += α q, r -= α aq."""
+    for i in range(x.shape[0]):
+        x[i] += alpha * q[i]
+        r[i] -= alpha * aq[i]
+
+
+@njit(cache=True, nogil=True)
+def _redirect(q, z, beta):
+    """q = z + β q."""
+    for i in range(q.shape[0]):
+        q[i] = z[i] + beta * q[i]

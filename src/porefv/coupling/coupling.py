@@ -1,0 +1,359 @@
+"""Coupling: grains that move in a viscous fluid, and a fluid that flows as they move (C14 §2.3)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from porefv.conductance.conductances import throat_conductances
+from porefv.conductance.model import ConductanceModel, ensure_model
+from porefv.conductance.registry import AUTO
+from porefv.coupling.coupled_pressure import CoupledPressure, Power
+from porefv.coupling.end_correction import end_corrected_conductances
+from porefv.coupling.exchange import EXCHANGES, Exchange
+from porefv.dem.protocol import GrainModel
+from porefv.errors import InputError
+from porefv.flow.fluid import Fluid
+from porefv.flow.pressure import held_pressures
+from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
+from porefv.packing.packing import Packing
+from porefv.system.threads import threads_for
+
+SCHEMES = ("auto", "implicit-drag", "semi-implicit")
+
+# Drag number up to which `auto` is explicit in the drag, and beyond which an explicit step is refused. It is unstable
+# from 2 on; below 0.1 the error of being explicit is a few parts in a hundred of the fastest drag.
+_EXPLICIT, _UNSTABLE = 0.1, 1.8
+# Bound on the power's relative error where pressures start anew on another mesh.
+_ANEW = 1e-8
+# Steps after which products of pressures with the matrix are worked out, not carried on, lest rounding gathers.
+_ANEW_EVERY = 50
+# Steps between two looks at how far grains have moved.
+_STRIDE = 10
+# The rows of the walls in arrays of grains and walls.
+_WALL_ROWS = np.arange(-6, 0)
+
+
+@dataclass
+class Effort:
+    """What a coupled run has taken.
+
+    Attributes
+    ----------
+    steps, iterations, meshes : int
+        Steps, iterations for pressures, meshes made.
+    seconds : dict
+        Spent on `mesh`, `grains`, `pressure` and `forces`.
+    """
+
+    steps: int = 0
+    iterations: int = 0
+    meshes: int = 0
+    seconds: dict[str, float] = field(
+        default_factory=lambda: {"mesh": 0.0, "grains": 0.0, "pressure": 0.0, "forces": 0.0}
+    )
+
+
+class Coupling:
+    """Grains and the fluid between them, stepped together.
+
+    Parameters
+    ----------
+    grains : GrainModel
+        A `porefv.dem.DEM`, without damping, or what takes its place. Stresses of its plates are total ones: contacts
+        and fluid bear them together.
+    walls : Walls
+        What each wall is to the fluid: drained at a (piezometric) pressure, or impervious.
+    fluid : Fluid, optional
+    conductance : ConductanceModel, optional
+        As of `PoreFlow`.
+    scheme : {'auto', 'implicit-drag', 'semi-implicit'}
+        `semi-implicit` (C14): pressures from the velocities before the step, forces explicit in it; stable where the
+        drag number is below 2. `implicit-drag`: pressures from the velocities after the step; stable at any viscosity.
+        `auto`: the first where the drag number is below 0.1, else the second.
+    exchange : {'facets', 'volumes'}
+        Volume rates and forces, see `porefv.coupling.exchange`.
+    tolerance : float
+        Bound on the relative error of the pressures in the norm of power, each step.
+    renewal : float
+        The mesh is made anew when a grain has moved by this part of the mean radius.
+    end_correction : bool
+        Whether to correct the drainage height for the looser layer of grains at a drained wall, see
+        `porefv.coupling.end_correction`.
+    start : Packing, optional
+        What to make the first mesh from, if not from the grains as they are: to go on from an earlier mesh.
+
+    Attributes
+    ----------
+    mesh : PoreMesh
+        The current one.
+    scheme : str
+        That of the current mesh, `auto` resolved.
+    drag_number : float or None
+        Of the current mesh, where the scheme asks for it; a lower bound where `auto` has seen enough.
+    effort : Effort
+
+    Raises
+    ------
+    InputError
+        For an unknown option; if the fluid, incompressible, has nowhere to go where walls move; if the step is
+        explicit and unstable.
+
+    Notes
+    -----
+    Time is that of the grains. Pressures and forces act over a step, from t - dt to t, and velocities live in its
+    middle.
+    """
+
+    mesh: PoreMesh
+    scheme: str
+    drag_number: float | None
+    _pores: CoupledPressure
+    _pressure: np.ndarray  # of the free pores
+    _rate: np.ndarray  # what the last step changed them by
+    _products: np.ndarray  # (2, n_free): products of both with the matrix; (2, 0) where that is not steady
+    _fresh: bool  # whether they are yet to be found on this mesh
+    _moves: np.ndarray
+
+    def __init__(
+        self,
+        grains: GrainModel,
+        walls: Walls,
+        fluid: Fluid | None = None,
+        conductance: ConductanceModel | None = None,
+        *,
+        scheme: str = "auto",
+        exchange: str = "facets",
+        tolerance: float = 1e-2,
+        renewal: float = 0.02,
+        end_correction: bool = True,
+        start: Packing | None = None,
+    ):
+        if scheme not in SCHEMES:
+            raise InputError(f"unknown scheme {scheme!r}; known: {', '.join(SCHEMES)}")
+        if exchange not in EXCHANGES:
+            raise InputError(f"unknown exchange {exchange!r}; known: {', '.join(EXCHANGES)}")
+        if not 0.0 < tolerance < 1.0:
+            raise InputError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+        if not 0.0 < renewal <= 1.0:
+            raise InputError(f"renewal must be a part of the mean radius, in (0, 1], not {renewal!r}")
+        self.options: dict[str, Any] = {
+            "scheme": scheme, "exchange": exchange, "tolerance": tolerance, "renewal": renewal,
+            "end_correction": end_correction,
+        }  # fmt: skip
+        self.grains = grains
+        self.walls = walls
+        self.fluid = fluid if fluid is not None else Fluid()
+        self.conductance = ensure_model(conductance) if conductance is not None else AUTO()
+        self.effort = Effort()
+        self._set_out(start if start is not None else Packing(grains.positions, grains.radii, grains.box))
+
+    # ---- time ---------------------------------------------------------------------------------------------------
+
+    def run(self, steps: int) -> None:
+        """Take so many steps.
+
+        Raises
+        ------
+        ComputationError
+            If the motion runs away, or pressures cannot be found.
+        """
+        for _ in range(steps):
+            if self.effort.steps % _STRIDE == 0 and self._moved() > self.options["renewal"]:
+                self._renew()
+            self._step()
+
+    def _step(self) -> None:
+        with self._timed("grains"):
+            predicted, wall_speeds, _, wall_mobilities = self.grains.predict()
+            self._refuse_no_way_out(wall_speeds, wall_mobilities)
+            moves = self._moves
+            if self.scheme == "implicit-drag":
+                moves[:-6], moves[-6:] = predicted, self.grains.wall_velocities
+            else:
+                moves[:] = self._velocities()
+            moves[_WALL_ROWS, WALL_AXES] = WALL_SENSES * wall_speeds
+        with self._timed("pressure"):
+            # Half of what the last step changed: all of it would pass its noise on.
+            guess, product = self._pressure + 0.5 * self._rate, None
+            steady = self._pores.is_steady(wall_mobilities)
+            if steady and self._products.size and self.effort.steps % _ANEW_EVERY:
+                product = self._products[0] + 0.5 * self._products[1]
+            asked = self.options["tolerance"]
+            tolerance = min(asked, _ANEW) if self._fresh else asked
+            with threads_for(len(guess)):
+                pressure, product, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance, product)
+            # The change is kept only where its product with the matrix is known too, or is not needed.
+            goes_on = not self._fresh and (self._products.size > 0 or not steady)
+            self._rate = pressure - self._pressure if goes_on else np.zeros_like(pressure)
+            if steady:
+                change = product - self._products[0] if goes_on else np.zeros_like(product)
+                self._products = np.stack([product, change])
+            else:
+                self._products = np.zeros((2, 0))
+            self._pressure, self._fresh = pressure, False
+        with self._timed("forces"):
+            forces = self._pores.forces(pressure)
+            thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
+        with self._timed("grains"):
+            self.grains.correct(forces[:-6], thrusts)
+        self.effort.steps += 1
+        self.effort.iterations += iterations
+
+    def _refuse_no_way_out(self, wall_speeds: np.ndarray, wall_mobilities: np.ndarray) -> None:
+        """An incompressible fluid needs an open wall, or one that yields, where others move."""
+        if self._closed and not wall_mobilities.any():
+            sections = self.grains.box.wall_areas
+            change = float(np.dot(wall_speeds, sections))
+            if abs(change) > 1e-12 * float(np.abs(wall_speeds * sections).sum()):
+                raise InputError(
+                    "no wall has a pressure and none presses with a stress, but walls move: an incompressible fluid "
+                    "has nowhere to go. Give a wall a pressure, or a plate a stress"
+                )
+
+    def set_walls(self, walls: Walls) -> None:
+        """Change what walls are to the fluid. Pressures of walls that keep having one may change at every step."""
+        same = (np.isnan(walls.pressures) == np.isnan(self.walls.pressures)).all() and (
+            walls.slip == self.walls.slip
+        ).all()
+        self.walls = walls
+        if same:
+            self._pores.set_pressures(walls.pressures)
+        else:
+            self._renew()
+
+    # ---- the mesh -----------------------------------------------------------------------------------------------
+
+    def _moved(self) -> float:
+        """Largest distance a grain has moved since the mesh was made, relative to the mean radius."""
+        way = self.grains.positions - self.mesh.packing.centres
+        return math.sqrt(float((way**2).sum(axis=1).max())) / self._mean_radius
+
+    def _renew(self) -> None:
+        """Make the mesh anew, with the pressures there were."""
+        around = _mean_by_vertex(self.mesh, self.cell_pressure)
+        self._set_out(Packing(self.grains.positions, self.grains.radii, self.grains.box))
+        cells = around[self.mesh.cells].mean(axis=1)
+        pores = np.bincount(self.mesh.cell_pore, cells, self.mesh.n_pores) / np.bincount(self.mesh.cell_pore)
+        self._pressure = pores[self._pores.free]
+
+    def _set_out(self, packing: Packing) -> None:
+        """Make the mesh of a packing, its conductances and its exchange with the grains, without pressures."""
+        with self._timed("mesh"):
+            grains, slip, pressures = self.grains, self.walls.slip, self.walls.pressures
+            mesh = PoreMesh(packing)
+            conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
+            if self.options["end_correction"]:
+                conductances = end_corrected_conductances(mesh, conductances, pressures)
+            held = ~np.isnan(held_pressures(mesh, pressures))
+            weights = solid_pressure_weights(mesh, self.conductance, conductances, slip, held)
+            exchange = Exchange.of(
+                mesh, self.options["exchange"], slip, grains.rows,
+                split=self.conductance.force_split, solid_pressure=weights,
+            )  # fmt: skip
+            drag = np.empty(len(packing))
+            drag[grains.rows] = grains.step / grains.masses
+            self._choose(lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities), drag)
+            self.mesh = mesh
+            self._mean_radius = float(packing.radii.mean())
+            self._closed = bool(np.isnan(pressures).all())
+            self._pressure, self._rate = np.zeros((2, np.count_nonzero(self._pores.free)))
+            self._products = np.zeros((2, 0))
+            self._fresh = True
+            self._moves = np.zeros((len(packing) + 6, 3))
+        self.effort.meshes += 1
+
+    def _choose(self, pores: Callable[[np.ndarray], CoupledPressure], drag: np.ndarray) -> None:
+        """The scheme, by the drag number where that is asked for; refuse an unstable one."""
+        asked = self.options["scheme"]
+        self.drag_number = None
+        self.scheme = asked
+        if asked != "implicit-drag":
+            explicit = pores(np.zeros_like(drag))
+            if explicit.cut_off:
+                if asked == "semi-implicit":
+                    raise InputError(
+                        f"no throat leads out of {explicit.cut_off} pores, whose volume changes as grains move: their "
+                        "pressure is not defined in a semi-implicit step. Use scheme = 'implicit-drag'"
+                    )
+                self.scheme = "implicit-drag"
+            else:
+                self.drag_number = explicit.drag_number(drag, _EXPLICIT if asked == "auto" else np.inf)
+                if asked == "auto":
+                    self.scheme = "semi-implicit" if self.drag_number <= _EXPLICIT else "implicit-drag"
+                elif self.drag_number > _UNSTABLE:
+                    raise InputError(
+                        f"a semi-implicit step of {self.grains.step:.3g} s is unstable: its drag number is "
+                        f"{self.drag_number:.3g}, {_UNSTABLE} at most. Use scheme = 'implicit-drag', or a step below "
+                        f"{self.grains.step * _UNSTABLE / self.drag_number:.2g} s"
+                    )
+            if self.scheme == "semi-implicit":
+                self._pores = explicit
+                return
+        self._pores = pores(drag)
+
+    # ---- what there is ------------------------------------------------------------------------------------------
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """(n_pores,): piezometric pressure of each pore of `mesh` over the last step [Pa]."""
+        return self._pores.full(self._pressure)
+
+    @property
+    def cell_pressure(self) -> np.ndarray:
+        """(n_cells,): piezometric pressure of each cell of `mesh` [Pa]."""
+        return self.pressure[self.mesh.cell_pore]
+
+    @property
+    def fluid_forces(self) -> np.ndarray:
+        """(n, 3): force of the fluid on each grain over the last step, by id [N]."""
+        return self._pores.forces(self._pressure)[:-6][self.grains.rows]
+
+    @property
+    def wall_fluid_forces(self) -> np.ndarray:
+        """(6, 3): force of the fluid on each wall over the last step [N]."""
+        return self._pores.forces(self._pressure)[-6:]
+
+    def _velocities(self) -> np.ndarray:
+        velocities = np.empty_like(self._moves)
+        velocities[:-6][self.grains.rows] = self.grains.velocities
+        velocities[-6:] = self.grains.wall_velocities
+        return velocities
+
+    @property
+    def wall_flux(self) -> dict[str, float]:
+        """Flux into the sample through each wall over the last step [m³/s]."""
+        fluxes = self._pores.wall_fluxes(self._pressure, self._velocities())
+        return {name: float(q) for name, q in zip(WALLS, fluxes, strict=True)}
+
+    @property
+    def power(self) -> Power:
+        """Where the fluid's power went over the last step."""
+        return self._pores.power(self._pressure, self._velocities())
+
+    @contextmanager
+    def _timed(self, part: str) -> Iterator[None]:
+        begin = time.perf_counter()
+        yield
+        self.effort.seconds[part] += time.perf_counter() - begin
+
+    def __repr__(self) -> str:
+        return f"Coupling({self.grains!r}, {self.scheme}, {self.mesh.n_pores} pores)"
+
+
+def _mean_by_vertex(mesh: PoreMesh, values: np.ndarray) -> np.ndarray:
+    """(n + 6,): mean of the cells' values (m,) around each vertex, weighted by volume."""
+    count = mesh.n_spheres + 6
+    volumes = np.repeat(mesh.cell_volumes, 4)
+    weight = np.bincount(mesh.cells.ravel(), volumes, count)
+    total = np.bincount(mesh.cells.ravel(), volumes * np.repeat(values, 4), count)
+    return np.divide(total, weight, out=np.zeros(count), where=weight > 0.0)

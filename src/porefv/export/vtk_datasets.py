@@ -1,0 +1,95 @@
+"""Cells, spheres and throats as VTK's datasets, for files, PyVista and ParaView."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from porefv.errors import InputError
+from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points
+from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.polyhedra import polyhedra
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.mesh.throats import Throats
+from porefv.packing.packing import Packing
+from porefv.system.optional_imports import load
+
+if TYPE_CHECKING:
+    import pyvista
+    from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
+
+
+def to_pyvista(mesh: CellMesh, **cell_data: Any) -> pyvista.UnstructuredGrid:
+    """The cells as a `pyvista.UnstructuredGrid`, in order, with the cell data given; of a `PoreMesh` also `pore` (id).
+
+    Parameters
+    ----------
+    mesh : CellMesh or PoreMesh
+    **cell_data
+        Arrays with a row per cell, or per pore of a `PoreMesh`: the cells of a pore then have the same value.
+
+    Raises
+    ------
+    MissingExtraError
+        If pyvista is not installed.
+    InputError
+        If an array has a row for neither each cell nor each pore.
+    """
+    pyvista = load("pyvista", "to_pyvista()")
+    return pyvista.UnstructuredGrid(cells_grid(mesh, **cell_data))
+
+
+def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
+    """As `to_pyvista`, but VTK's own object: what the results are written from, without pyvista."""
+    vtk = vtk_data_model()
+    solids = polyhedra(mesh)
+    grid = vtk.vtkUnstructuredGrid()
+    grid.SetPoints(vtk_points(solids.points))
+    cells = vtk.vtkCellArray()
+    cells.SetData(vtk_array(solids.offsets), vtk_array(solids.connectivity))
+    grid.SetCells(vtk_array(solids.types), cells)
+    data = {"pore": mesh.cell_pore} if isinstance(mesh, PoreMesh) else {}
+    for name, values in cell_data.items():
+        data[name] = _by_cell(mesh, name, np.asarray(values))
+    attach(grid.GetCellData(), data)
+    return grid
+
+
+def _by_cell(mesh: CellMesh, name: str, values: np.ndarray) -> np.ndarray:
+    """Values with a row per cell, from one per cell or per pore."""
+    if len(values) == mesh.n_cells:
+        return values
+    pores = ""
+    if isinstance(mesh, PoreMesh):
+        if len(values) == mesh.n_pores:
+            return values[mesh.cell_pore]
+        pores = f" or per pore ({mesh.n_pores})"
+    raise InputError(f"cell data {name!r} has {len(values)} rows: needed is one per cell ({mesh.n_cells}){pores}")
+
+
+def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
+    """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows)."""
+    n = len(packing)
+    polydata = vtk_data_model().vtkPolyData()
+    polydata.SetPoints(vtk_points(packing.centres))
+    polydata.SetVerts(cell_array(np.arange(n)[:, None]))
+    attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data})
+    return polydata
+
+
+def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
+    """The network: a point per pore, a line per throat with the cell data given (t rows).
+
+    Points are Laguerre vertices, that of a united pore the mean of several.
+    """
+    mesh = throats.mesh
+    points = mesh.vertices
+    if mesh.n_united:
+        count = np.bincount(mesh.cell_pore, minlength=mesh.n_pores)
+        points = np.stack([np.bincount(mesh.cell_pore, x, mesh.n_pores) / count for x in points.T], axis=1)
+    polydata = vtk_data_model().vtkPolyData()
+    polydata.SetPoints(vtk_points(points))
+    polydata.SetLines(cell_array(throats.pores))
+    attach(polydata.GetCellData(), cell_data)
+    return polydata

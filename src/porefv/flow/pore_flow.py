@@ -1,0 +1,326 @@
+"""PoreFlow: steady viscous flow through the pores of a fixed packing, each quantity computed when asked for.
+
+The functions that it calls can be used without it: `throat_conductances`, `solve_pressure`, `fluxes`,
+`solid_pressure_weights`, `grain_forces`, `pore_velocities`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.conductance.conductances import throat_conductances
+from porefv.conductance.model import ConductanceModel, ensure_model
+from porefv.conductance.registry import AUTO
+from porefv.errors import InputError
+from porefv.flow.fluid import Fluid
+from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
+from porefv.flow.forces import Forces, grain_forces
+from porefv.flow.pressure import (
+    PressureField,
+    given_pressure,
+    held_pressures,
+    pores_of_several_pressures,
+    reference_pressure,
+    solve_pressure,
+)
+from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.velocity import pore_velocities
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALLS
+from porefv.packing.packing import Packing
+from porefv.solvers.solver import TOLERANCE, SolverReport
+from porefv.system.number_checks import MOST, ensure_finite
+
+if TYPE_CHECKING:
+    from porefv.fipy.pressure_problem import FipyProblem
+
+STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
+
+
+class PoreFlow:
+    """Steady flow of a viscous fluid through the pores of a fixed packing (C12).
+
+    Pressures are piezometric, p = p* - ρ g·x: what drives the flow, without the hydrostatic part that gravity adds.
+
+    Parameters
+    ----------
+    mesh : PoreMesh or Packing
+    walls : Walls
+        Condition on each wall; at least one must hold a pressure.
+    fluid : Fluid
+    conductance : ConductanceModel, optional
+        `SectionFriction()` by default; `HydraulicRadius()` is the model of C12.
+    gravity : (3,) sequence of float
+        Acceleration of gravity, for buoyancy [m/s²].
+    solver, tolerance
+        See `porefv.solvers.solver.Solver`.
+
+    Examples
+    --------
+    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+    >>> print(f"{flow.permeability:.3g} m², {flow.forces}")
+    """
+
+    def __init__(
+        self,
+        mesh: PoreMesh | Packing,
+        walls: Walls,
+        fluid: Fluid | None = None,
+        conductance: ConductanceModel | None = None,
+        *,
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        solver: str = "auto",
+        tolerance: float = TOLERANCE,
+    ):
+        self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
+        self.walls = walls
+        self.fluid = fluid if fluid is not None else Fluid()
+        self.conductance = ensure_model(conductance) if conductance is not None else AUTO()
+        self.gravity = np.asarray(gravity, float)
+        self.solver = solver
+        self.tolerance = tolerance
+        self.timings: dict[str, float] = {}
+        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
+            raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
+        if np.abs(self.gravity).max() > MOST:
+            raise InputError(f"gravity must be at most {MOST:g} m/s² along each axis, not {gravity!r}")
+        self._reference = reference_pressure(walls)
+        self._given: PressureField | None = None
+
+    @classmethod
+    def from_pressure(
+        cls,
+        mesh: PoreMesh,
+        pressure: np.ndarray,
+        walls: Walls,
+        fluid: Fluid | None = None,
+        conductance: ConductanceModel | None = None,
+        *,
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> PoreFlow:
+        """The flow of a pressure found elsewhere, for instance by FiPy: its fluxes, forces and files.
+
+        Parameters
+        ----------
+        mesh : PoreMesh
+        pressure : (n_pores,) array
+            Piezometric pressure of each pore [Pa]. Pores on walls of imposed pressure must have that pressure, to
+            1e-6 of the range of the pressures.
+        walls, fluid, conductance, gravity
+            As of `PoreFlow`.
+
+        Raises
+        ------
+        InputError
+            For pressures of the wrong shape, not finite, or other than those imposed.
+
+        Examples
+        --------
+        >>> other = PoreFlow.from_pressure(mesh, flow.to_fipy().solve(), flow.walls)  # doctest: +SKIP
+        >>> other.forces.total  # doctest: +SKIP
+        """
+        flow = cls(mesh, walls, fluid, conductance, gravity=gravity)
+        flow._given = given_pressure(mesh, flow.conductances, np.asarray(pressure, float), walls)
+        return flow
+
+    # ---- pressure -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _held(self) -> np.ndarray:
+        """Imposed pressures less the lowest of them."""
+        return held_pressures(self.mesh, self.walls.pressures - self._reference)
+
+    @property
+    def pores_of_several_pressures(self) -> np.ndarray:
+        """(n_pores,) bool: pores that touch walls of different imposed pressures."""
+        return pores_of_several_pressures(self.mesh, self.walls)
+
+    @property
+    def imposed_pressures(self) -> np.ndarray:
+        """(n_pores,): imposed pressure of the pores on pressure walls, NaN elsewhere [Pa].
+
+        Pores that touch several pressure walls take the mean of theirs.
+        """
+        return self._held + self._reference
+
+    @cached_property
+    def conductances(self) -> np.ndarray:
+        """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
+        with self._timed("throats"):
+            return throat_conductances(self.mesh, self.conductance, self.walls.slip, self.fluid.viscosity)
+
+    @cached_property
+    def solution(self) -> PressureField:
+        """The pressure field, with the solver's report and the isolated pores."""
+        if self._given is not None:
+            return self._given
+        conductances = self.conductances
+        with self._timed("solve"):
+            return solve_pressure(self.mesh, conductances, self.walls, solver=self.solver, tolerance=self.tolerance)
+
+    @cached_property
+    def pressure(self) -> np.ndarray:
+        """(n_pores,): piezometric pressure of each pore [Pa]."""
+        return self.solution.pressure
+
+    @cached_property
+    def _acting_pressure(self) -> np.ndarray:
+        held = ~np.isnan(self._held)
+        weights = solid_pressure_weights(self.mesh, self.conductance, self.conductances, self.walls.slip, held)
+        relative = self.solution.relative
+        return relative if weights is None else weights.interpolate(relative)
+
+    @property
+    def acting_pressure(self) -> np.ndarray:
+        """(n_pores,): piezometric pressure that acts on the grains of each pore (`flow.solid_pressure`) [Pa]."""
+        return self._acting_pressure + self._reference
+
+    @property
+    def cell_pressure(self) -> np.ndarray:
+        """(n_cells,): piezometric pressure of each cell [Pa]."""
+        return self.pressure[self.mesh.cell_pore]
+
+    @property
+    def solver_report(self) -> SolverReport:
+        """Solver, iterations and residual."""
+        return self.solution.report
+
+    # ---- fluxes -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def flux(self) -> np.ndarray:
+        """(t,): flux through each throat, from its first pore to its second [m³/s]."""
+        return fluxes(self.mesh, self.conductances, self.solution)
+
+    @cached_property
+    def _face_flux(self) -> np.ndarray:
+        """(w,): flux into the sample through each wall face [m³/s]."""
+        return wall_face_fluxes(self.mesh, net_outflows(self.mesh, self.flux), self.walls.held)
+
+    @property
+    def wall_flux(self) -> dict[str, float]:
+        """Flux into the sample through each wall [m³/s]; zero through impervious ones."""
+        totals = np.bincount(self.mesh.wall_faces.walls, self._face_flux, 6)
+        return {name: float(q) for name, q in zip(WALLS, totals, strict=True)}
+
+    @property
+    def inflow(self) -> float:
+        """Total flux through the walls where fluid enters [m³/s]."""
+        return sum(max(q, 0.0) for q in self.wall_flux.values())
+
+    @property
+    def outflow(self) -> float:
+        """Total flux through the walls where fluid leaves [m³/s]."""
+        return sum(max(-q, 0.0) for q in self.wall_flux.values())
+
+    @property
+    def imbalance(self) -> float:
+        """Inflow less outflow, relative to the larger."""
+        larger = max(self.inflow, self.outflow)
+        return abs(self.inflow - self.outflow) / larger if larger > 0.0 else 0.0
+
+    @cached_property
+    def permeability(self) -> float:
+        """k = μ Q h0 / (ΔP S) along the axis of the two pressure walls (C12 §3.3) [m²].
+
+        Raises
+        ------
+        InputError
+            If the pressure walls are not one pair of opposite walls at different pressures.
+        """
+        axis = self.walls.axis
+        pressures = self.walls.pressures
+        if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
+            raise InputError(
+                "permeability needs exactly two pressure walls, opposite each other and at different pressures"
+            )
+        drop = pressures[2 * axis] - pressures[2 * axis + 1]
+        flux = math.copysign(0.5 * (self.inflow + self.outflow), drop)
+        box = self.mesh.box
+        return float(self.fluid.viscosity * flux * box.size[axis] / (drop * box.section(axis)))
+
+    @property
+    def hydraulic_conductivity(self) -> float:
+        """k ρ g / μ, with standard gravity [m/s]."""
+        return self.permeability * self.fluid.density * STANDARD_GRAVITY / self.fluid.viscosity
+
+    @cached_property
+    def pore_velocity(self) -> np.ndarray:
+        """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
+        return ensure_finite(pore_velocities(self.mesh, self.flux, self._face_flux), "velocities")
+
+    @property
+    def closing_error(self) -> float:
+        """Part of the flow that is missing, at most, because throats are closed that may be open; between 0 and 1.
+
+        Throats without conductance that their spheres do not cover are closed for want of a better answer: A^f, φ or Σγ
+        came out as zero or less. None is more open than a round hole of all its area A in a thin plate, q = a³ Δp / 3μ
+        with π a² = A (Sampson 1891), and by Dirichlet's principle the pressures found without them bound from above
+        what power flows would take with them. Between two walls power is in proportion to permeability: with all
+        of them open it is k / (1 - closing_error) at most.
+        """
+        throats = self.mesh.throats
+        doubtful = np.flatnonzero((self.conductances == 0.0) & ~throats.covered)
+        if len(doubtful) == 0:
+            return 0.0
+        images = throats.mirror_images(self.walls.slip)[doubtful]
+        radii = np.sqrt(images * throats.areas[doubtful] / np.pi)
+        holes = radii**3 / (3.0 * self.fluid.viscosity * images)
+        range_ = max(float(np.nanmax(self._held)), np.finfo(float).tiny)
+        drop = self.solution.drops(throats.pores) / range_
+        missing = float((holes * drop[doubtful] ** 2).sum())
+        power = float((self.conductances * drop**2).sum())
+        return missing / (power + missing) if missing > 0.0 else 0.0
+
+    # ---- forces -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def forces(self) -> Forces:
+        """Forces on every sphere and wall."""
+        _ = self.solution  # timed by itself
+        with self._timed("forces"):
+            forces = grain_forces(
+                self.mesh,
+                self._acting_pressure,
+                self.walls,
+                self.conductance.force_split,
+                reference=self._reference,
+                weight=self.fluid.density * self.gravity,
+            )
+            ensure_finite(forces.total, "forces")
+            return forces
+
+    def to_fipy(self) -> FipyProblem:
+        """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
+        from porefv.fipy.pore_mesh import FipyPoreMesh
+        from porefv.fipy.pressure_problem import FipyProblem
+
+        return FipyProblem(self, FipyPoreMesh(self.mesh, ~np.isnan(self._held)))
+
+    # ---- bookkeeping --------------------------------------------------------------------------------------------
+
+    def _timed(self, stage: str) -> _Timer:
+        return _Timer(self.timings, stage)
+
+    def __repr__(self) -> str:
+        held = ", ".join(f"{name} {wall.pressure:g} Pa" for name, wall in zip(WALLS, self.walls, strict=True)
+                         if wall.pressure is not None)  # fmt: skip
+        return f"PoreFlow({self.mesh!r}, {self.conductance.name}, {held})"
+
+
+class _Timer:
+    def __init__(self, timings: dict[str, float], stage: str):
+        self.timings, self.stage = timings, stage
+
+    def __enter__(self) -> None:
+        self.begin = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self.timings[self.stage] = time.perf_counter() - self.begin

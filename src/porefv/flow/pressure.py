@@ -1,0 +1,187 @@
+"""The pressure of every pore, from the conductances of the throats and the pressures imposed on the walls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from porefv.errors import InputError, counted
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.solvers.pressure_equation import reached, solve_network
+from porefv.solvers.solver import TOLERANCE, SolverReport
+
+# How far a given pressure may be from the imposed one of its pore, relative to the range of the pressures.
+GIVEN_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PressureField:
+    """Piezometric pressure of every pore.
+
+    Attributes
+    ----------
+    reference : float
+        The lowest imposed pressure, kept apart so that a small drop on a large pressure keeps its digits [Pa].
+    relative : (n_pores,) array
+        Pressure of each pore above the reference [Pa].
+    remainder : (n_pores,) array
+        What rounding has left of each pressure: differences of `relative` plus those of `remainder` drive the fluxes,
+        also through throats that are many decades more conductive than others [Pa].
+    isolated : (n_pores,) bool array
+        Pores from which no flow reaches a pore of imposed pressure.
+    report : SolverReport
+    """
+
+    reference: float
+    relative: np.ndarray
+    remainder: np.ndarray
+    isolated: np.ndarray
+    report: SolverReport
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """(n_pores,): pressure of each pore [Pa]."""
+        return self.relative + self.reference
+
+    def drops(self, pairs: np.ndarray) -> np.ndarray:
+        """(t,): fall of pressure from the first to the second pore of each pair (t, 2) [Pa]."""
+        i, j = pairs.T
+        return (self.relative[i] - self.relative[j]) + (self.remainder[i] - self.remainder[j])
+
+
+def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
+    """(n_pores,): pressure of the pores on walls of given pressure (6,), NaN elsewhere [Pa].
+
+    Pores that touch several such walls take the mean of theirs.
+    """
+    faces = mesh.wall_faces
+    held = ~np.isnan(pressures[faces.walls])
+    pores = mesh.cell_pore[faces.cells[held]]
+    pairs = np.unique(np.stack([pores, faces.walls[held]], axis=1), axis=0)
+    count = np.bincount(pairs[:, 0], minlength=mesh.n_pores)
+    total = np.bincount(pairs[:, 0], pressures[pairs[:, 1]], mesh.n_pores)
+    return np.divide(total, count, out=np.full(mesh.n_pores, np.nan), where=count > 0)
+
+
+def pores_of_several_pressures(mesh: PoreMesh, walls: Walls) -> np.ndarray:
+    """(n_pores,) bool: pores that touch walls of different imposed pressures."""
+    faces = mesh.wall_faces
+    imposed = walls.pressures[faces.walls]
+    held = ~np.isnan(imposed)
+    pores = mesh.cell_pore[faces.cells[held]]
+    lowest, highest = np.full(mesh.n_pores, np.inf), np.full(mesh.n_pores, -np.inf)
+    np.minimum.at(lowest, pores, imposed[held])
+    np.maximum.at(highest, pores, imposed[held])
+    return lowest < highest
+
+
+def reference_pressure(walls: Walls) -> float:
+    """The lowest imposed pressure [Pa].
+
+    Raises
+    ------
+    InputError
+        If no wall has a pressure.
+    """
+    if not walls.held.any():
+        raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
+    return float(np.nanmin(walls.pressures))
+
+
+def solve_pressure(
+    mesh: PoreMesh,
+    conductances: np.ndarray,
+    walls: Walls,
+    *,
+    sources: np.ndarray | None = None,
+    solver: str = "auto",
+    tolerance: float = TOLERANCE,
+) -> PressureField:
+    """Solve Σ_j K_ij (p_i - p_j) = source_i for the pores that are not on a wall of imposed pressure (C12 eq. 20).
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    conductances : (t,) array
+        K of each throat [m³/(Pa s)], from `porefv.conductance.conductances` or elsewhere; zero where closed.
+    walls : Walls
+        At least one must have a pressure.
+    sources : (n_pores,) array, optional
+        Volume injected into each pore per unit time [m³/s].
+    solver, tolerance
+        See `porefv.solvers.Solver`.
+
+    Raises
+    ------
+    InputError
+        If no wall has a pressure, or an argument has the wrong shape.
+    ComputationError
+        If the solver fails, or an isolated pore has a source.
+
+    Examples
+    --------
+    >>> mesh, walls = PoreMesh(Packing.read("data/packings/n25_s1.csv")), Walls.along("y")  # doctest: +SKIP
+    >>> conductances = throat_conductances(mesh, SectionFriction(), walls.slip, viscosity=1e-3)  # doctest: +SKIP
+    >>> solve_pressure(mesh, conductances, walls).pressure.max()  # doctest: +SKIP
+    1.0
+    """
+    if np.shape(conductances) != (len(mesh.throats),):
+        raise InputError(
+            f"conductances must have one value per throat, ({len(mesh.throats)},), not shape {np.shape(conductances)}"
+        )
+    if sources is not None and np.shape(sources) != (mesh.n_pores,):
+        raise InputError(f"sources must have one value per pore, ({mesh.n_pores},), not shape {np.shape(sources)}")
+    reference = reference_pressure(walls)
+    found = solve_network(
+        mesh.throats.pores,
+        conductances,
+        held_pressures(mesh, walls.pressures - reference),
+        links=lambda: mesh.throats.areas,
+        sources=sources,
+        solver=solver,
+        tolerance=tolerance,
+    )
+    return PressureField(reference, found.pressure, found.rest, found.isolated, found.report)
+
+
+def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarray, walls: Walls) -> PressureField:
+    """A pressure field found elsewhere, with the imbalance that it leaves.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    conductances : (t,) array
+        K of each throat [m³/(Pa s)].
+    pressure : (n_pores,) array
+        Pressure of each pore; on walls of imposed pressure the imposed one, to `GIVEN_TOLERANCE` of their range [Pa].
+    walls : Walls
+
+    Raises
+    ------
+    InputError
+        For pressures of the wrong shape, not finite, or other than those imposed.
+    """
+    if pressure.shape != (mesh.n_pores,) or not np.isfinite(pressure).all():
+        raise InputError(f"pressure must be {mesh.n_pores} finite numbers, one per pore, not {pressure.shape}")
+    reference = reference_pressure(walls)
+    imposed = held_pressures(mesh, walls.pressures)
+    free = np.isnan(imposed)
+    span = float(np.ptp(pressure)) or abs(reference) or 1.0
+    wrong = np.flatnonzero(np.abs(pressure - imposed) > GIVEN_TOLERANCE * span)  # false for free pores, which have NaN
+    if len(wrong):
+        raise InputError(
+            f"{counted(len(wrong), 'pore')} on walls of imposed pressure have another pressure, the first of them "
+            f"pore {wrong[0]}: {pressure[wrong[0]]:.6g} Pa instead of {imposed[wrong[0]]:.6g} Pa; give the pressure of "
+            "every pore, those on the walls included"
+        )
+    relative = pressure - reference
+    pairs = mesh.throats.pores
+    i, j = pairs.T
+    flux = conductances * (relative[i] - relative[j])
+    outflow = np.bincount(i, flux, mesh.n_pores) - np.bincount(j, flux, mesh.n_pores)
+    lost, through = float(np.abs(outflow[free]).sum()), 0.5 * float(np.abs(outflow[~free]).sum())
+    imbalance = lost / through if through > 0.0 else lost
+    report = SolverReport("given", int(np.count_nonzero(free)), 0, 0.0, imbalance, 0.0, 0.0)
+    return PressureField(reference, relative, np.zeros(mesh.n_pores), ~reached(pairs, conductances, ~free), report)

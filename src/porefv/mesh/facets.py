@@ -1,0 +1,137 @@
+"""Facets: the faces between the cells of a mesh, and the solid in them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.mesh.facet_kernels import enumerate_facets, facet_centroids, row_sums
+from porefv.mesh.facet_sections import facet_sections
+from porefv.mesh.facet_volumes import facet_volumes
+
+if TYPE_CHECKING:
+    from porefv.mesh.cell_mesh import CellMesh
+
+
+class Facets:
+    """Facets between the cells of a mesh, one row each; everything is computed when first asked for.
+
+    A facet is a triangle (three spheres), a trapezoid (two spheres and a wall) or a rectangle (one sphere and two
+    walls). It is normal to the line between the Laguerre vertices P_i and P_j of its two cells.
+
+    Parameters
+    ----------
+    mesh : CellMesh
+
+    Notes
+    -----
+    Values are signed, which makes sums over all facets exact: Σφ is the void volume, Σγ^k the free surface of sphere k.
+    Where spheres overlap, single values of A^f, φ or γ may be zero or negative.
+    """
+
+    def __init__(self, mesh: CellMesh):
+        self.mesh = mesh
+
+    # ---- topology -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _topology(self) -> tuple[np.ndarray, np.ndarray]:
+        mesh = self.mesh
+        # Every cell has four facets, each shared by two, but for the eight at the corners of the box.
+        count = (4 * mesh.n_cells - 8) // 2
+        cells, vertices = np.empty((count, 2), np.int32), np.empty((count, 3), np.int32)
+        enumerate_facets(mesh.cells, mesh.neighbours, mesh.n_spheres, cells, vertices)
+        return cells, vertices
+
+    @property
+    def cells(self) -> np.ndarray:
+        """(f, 2) int32: the two cells of each facet; its normal points from the first to the second."""
+        return self._topology[0]
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(f, 3) int32: vertices of each facet, spheres first, right-handed about its normal."""
+        return self._topology[1]
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    # ---- the facet as a cross-section -------------------------------------------------------------------------------
+
+    @cached_property
+    def _sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        mesh, f = self.mesh, len(self)
+        arrays = np.empty((f, 3)), np.empty(f), np.empty(f), np.empty((f, 3)), np.empty(f, bool)
+        facet_sections(
+            self.cells, self.vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, *arrays
+        )
+        return arrays
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(f, 3): unit normal of each facet, from its first cell to its second."""
+        return self._sections[0]
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(f,): L = (P_j - P_i)·n of each facet [m]."""
+        return self._sections[1]
+
+    @property
+    def fluid_areas(self) -> np.ndarray:
+        """(f,): A^f = A - Σ A^k of each facet [m²]."""
+        return self._sections[2]
+
+    @property
+    def sectors(self) -> np.ndarray:
+        """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
+        return self._sections[3]
+
+    @property
+    def covered(self) -> np.ndarray:
+        """(f,) bool: facets covered by their spheres, all of which hold the facet's radical centre."""
+        return self._sections[4]
+
+    @property
+    def areas(self) -> np.ndarray:
+        """(f,): area A of each facet, solid and fluid [m²]."""
+        return self.fluid_areas + row_sums(self.sectors)
+
+    @property
+    def centroids(self) -> np.ndarray:
+        """(f, 3): centroid of each facet, from the mesh's local origin [m]."""
+        mesh = self.mesh
+        return facet_centroids(self.vertices, mesh.n_spheres, mesh.local_points, mesh.sizes)
+
+    # ---- the space between the two Laguerre vertices ----------------------------------------------------------------
+
+    @cached_property
+    def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
+        mesh = self.mesh
+        arrays = np.empty(len(self)), np.empty((len(self), 3))
+        facet_volumes(
+            self.cells, self.vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, *arrays
+        )
+        return arrays
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """(f,): void volume φ of each facet's pair of pyramids Ω_ij [m³]."""
+        return self._volumes[0]
+
+    @property
+    def surfaces(self) -> np.ndarray:
+        """(f, 3): solid surface γ^k of each facet's vertices within Ω_ij, walls included [m²]."""
+        return self._volumes[1]
+
+    def wetted_surfaces(self, slip: np.ndarray) -> np.ndarray:
+        """(f, 3): γ^k of spheres and no-slip walls; walls with slip, (6,) bool, count as zero (C12 §3.1) [m²]."""
+        if not slip.any():
+            return self.surfaces
+        drags = np.concatenate([np.ones(self.mesh.n_spheres, bool), ~slip])
+        return self.surfaces * drags[self.vertices]
+
+    def __repr__(self) -> str:
+        return f"Facets({len(self)} facets between {self.mesh.n_cells} cells)"

@@ -1,0 +1,73 @@
+"""Laguerre planes between spheres that overlap or are neighbours, and the volumes of Laguerre cells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from porefv.mesh.facet_kernels import facet_corners
+from porefv.mesh.vectors import cross_product, dot, minus, times, towards, unit, vector_at, wall_distance
+from porefv.system.kernels import njit
+
+
+@njit(cache=True)
+def crosses_laguerre_plane(k, m, u, n, points, sizes):
+    """Whether sphere k reaches beyond its Laguerre plane towards m."""
+    if m >= n:
+        return wall_distance(k, m, points, sizes) < sizes[k]
+    return dot(u, u) < (sizes[k] + sizes[m]) * (sizes[k] + sizes[m])
+
+
+@njit(cache=True, error_model="numpy")
+def laguerre_plane_distances(k, m, u, n, points, sizes):
+    """Distances of centres k and m from the Laguerre plane between them, each within its radius.
+
+    u leads from k to m. Of a wall, the second distance has no meaning.
+    """
+    r = sizes[k]
+    if m >= n:
+        return min(max(wall_distance(k, m, points, sizes), -r), r), 0.0
+    d, beyond = laguerre_feet(u, r, sizes[m])
+    return min(max(d, -r), r), min(max(beyond, -sizes[m]), sizes[m])
+
+
+@njit(cache=True, error_model="numpy")
+def laguerre_feet(u, r, s):
+    """Distances of the centres of two spheres of radii r and s, u apart, from the Laguerre plane between them."""
+    square = dot(u, u)
+    length = np.sqrt(square)
+    d = 0.5 * (square + (r - s) * (r + s)) / length
+    return d, length - d
+
+
+@njit(cache=True, error_model="numpy")
+def laguerre_volumes(facet_cells, facet_vertices, vertices, n, points, sizes):
+    """(n,): volume of the Laguerre cell of each sphere.
+
+    The face between spheres k and m is a polygon with a corner P_i for each cell around the edge km. A facet with that
+    edge owns the triangle from P_i to P_j and the face's foot, d from centre k, and a pyramid d h L / 6 under it: h is
+    from the foot to the line of the P's, towards the facet's own side, and all are signed.
+    """
+    volumes = np.zeros(n)
+    for f in range(facet_cells.shape[0]):
+        a, b, c, ab, ac, cross, twice = facet_corners(f, facet_vertices, n, points)
+        if twice == 0.0:
+            continue
+        pi = vector_at(facet_cells[f, 0], vertices)
+        length = dot(cross, minus(vector_at(facet_cells[f, 1], vertices), pi)) / twice
+        for side in range(3):
+            k = a if side != 1 else b
+            m = b if side == 0 else c
+            if k >= n:
+                continue
+            # Along the edge from k to m, in the facet's cyclic sense and unit.
+            u = towards(k, m, n, points)
+            edge = unit(u)
+            inward = cross_product(cross, edge if side != 2 else times(-1.0, edge))
+            h = dot(inward, minus(pi, vector_at(k, points))) / twice
+            if m >= n:
+                volumes[k] += wall_distance(k, m, points, sizes) * h * length / 6.0
+                continue
+            d, beyond = laguerre_feet(u, sizes[k], sizes[m])
+            volumes[k] += d * h * length / 6.0
+            volumes[m] += beyond * h * length / 6.0
+    return volumes

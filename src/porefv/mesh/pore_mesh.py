@@ -1,0 +1,119 @@
+"""PoreMesh: the void of a packing as a finite-volume mesh of pores, joined by throats."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.errors import InputError
+from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.throats import Throats
+from porefv.mesh.uniting import unite
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+
+if TYPE_CHECKING:
+    from porefv.fipy.pore_mesh import FipyPoreMesh
+
+# Laguerre vertices this close, relative to the smallest sphere of the facet between them, coincide but for rounding.
+TIE_TOLERANCE = 1e-9
+
+
+class PoreMesh(CellMesh):
+    """Pores of a packing: the cells of its regular triangulation, with those that share a Laguerre vertex united.
+
+    Everything is computed when first asked for.
+
+    Parameters
+    ----------
+    packing : Packing
+        Spheres, validated on the way in.
+    box : Box, optional
+        Replaces the packing's own box.
+    unite_tolerance : float
+        Cells whose Laguerre vertices are closer than this fraction of the smallest sphere radius of the facet
+        between them are one pore: there is next to no length to resist flow along. 0 unites exact ties only.
+    wall_tolerance : float
+        Largest fraction of its radius by which a sphere may cross a wall.
+
+    Raises
+    ------
+    InputError
+        If the packing is not fit for use (see `Packing.validate`), or has no box.
+    """
+
+    def __init__(
+        self,
+        packing: Packing,
+        box: Box | None = None,
+        *,
+        unite_tolerance: float = 0.01,
+        wall_tolerance: float = 0.05,
+    ):
+        if not 0.0 <= unite_tolerance < 1.0:
+            raise InputError(f"unite_tolerance must lie in [0, 1), not {unite_tolerance!r}")
+        super().__init__(packing, box, wall_tolerance=wall_tolerance)
+        self.unite_tolerance = unite_tolerance
+
+    @cached_property
+    def _united(self) -> tuple[np.ndarray, np.ndarray]:
+        exact, asked = (
+            unite(self.facets.cells, self.facets.vertices, self.local_vertices, self.n_spheres, self.sizes, tolerance)
+            for tolerance in (TIE_TOLERANCE, max(self.unite_tolerance, TIE_TOLERANCE))
+        )
+        return exact, asked
+
+    @property
+    def cell_node(self) -> np.ndarray:
+        """(m,) int32: Laguerre vertex of each cell; cells of a tie (cospherical spheres) share one."""
+        return self._united[0]
+
+    @property
+    def cell_pore(self) -> np.ndarray:
+        """(m,) int32: pore of each cell."""
+        return self._united[1]
+
+    @cached_property
+    def n_pores(self) -> int:
+        return int(self.cell_pore.max()) + 1
+
+    @cached_property
+    def cells_of_pores(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cells in the order of their pores (m,), and where those of each pore begin (n_pores + 1,)."""
+        order = np.argsort(self.cell_pore, kind="stable")
+        return order, np.searchsorted(self.cell_pore[order], np.arange(self.n_pores + 1))
+
+    @property
+    def n_united(self) -> int:
+        """Number of pores lost to uniting: cells less pores."""
+        return self.n_cells - self.n_pores
+
+    @cached_property
+    def pore_volumes(self) -> np.ndarray:
+        """(n_pores,): void volume of each pore [m³]."""
+        return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
+
+    @cached_property
+    def throats(self) -> Throats:
+        """The throats between the pores."""
+        return Throats(self)
+
+    def to_fipy(self, held: np.ndarray | None = None) -> FipyPoreMesh:
+        """The pores as a `fipy` mesh (see `porefv.fipy`).
+
+        Parameters
+        ----------
+        held : (n_pores,) bool array, optional
+            Pores of imposed value: left out of the mesh, their throats become exterior faces.
+        """
+        from porefv.fipy.pore_mesh import FipyPoreMesh
+
+        return FipyPoreMesh(self, held)
+
+    def __repr__(self) -> str:
+        return (
+            f"PoreMesh({self.n_spheres} spheres, {self.n_pores} pores, {len(self.throats)} throats, "
+            f"box {self.box.sides})"
+        )

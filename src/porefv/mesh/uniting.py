@@ -1,0 +1,57 @@
+"""Which cells share a Laguerre vertex, exactly or nearly, and are united to one pore."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from porefv.system.growing_arrays import doubled
+from porefv.system.kernels import njit
+from porefv.system.union_find import join
+
+
+@njit(cache=True)
+def unite(facet_cells, facet_vertices, vertices, n, sizes, tolerance):
+    """Label of each cell, equal across facets whose Laguerre vertices are within `tolerance` of the smallest radius.
+
+    Labels follow the order of the cells.
+    """
+    parent = np.arange(vertices.shape[0], dtype=np.int32)
+    for f in range(facet_cells.shape[0]):
+        i = facet_cells[f, 0]
+        j = facet_cells[f, 1]
+        square = 0.0
+        for axis in range(3):
+            square += (vertices[i, axis] - vertices[j, axis]) ** 2
+        radius = np.inf
+        for v in range(3):
+            if facet_vertices[f, v] < n:
+                radius = min(radius, sizes[facet_vertices[f, v]])
+        if square <= (tolerance * radius) ** 2:
+            join(parent, i, j)
+    count = 0
+    for t in range(parent.shape[0]):  # a root comes before all that hang on it
+        if parent[t] == t:
+            parent[t] = count
+            count += 1
+        else:
+            parent[t] = parent[parent[t]]
+    return parent
+
+
+@njit(cache=True)
+def tied_facets(facet_cells, cell_node, cell_pore):
+    """Facets between two pores both of whose Laguerre vertices are shared by several cells."""
+    cells = np.zeros(cell_node.max() + 1, np.int32)
+    for t in range(cell_node.shape[0]):
+        cells[cell_node[t]] += 1
+    found = np.empty(64, np.int64)
+    count = 0
+    for f in range(facet_cells.shape[0]):
+        i = facet_cells[f, 0]
+        j = facet_cells[f, 1]
+        if cells[cell_node[i]] > 1 and cells[cell_node[j]] > 1 and cell_pore[i] != cell_pore[j]:
+            if count == found.shape[0]:
+                found = doubled(found)
+            found[count] = f
+            count += 1
+    return found[:count].copy()

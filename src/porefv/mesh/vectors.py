@@ -1,0 +1,62 @@
+"""Vectors of three numbers as tuples, and vectors between the vertices of cells: spheres (k < n) and walls (n + w).
+
+`points` and `sizes` are `CellMesh.local_points` and `CellMesh.sizes`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from porefv.system.kernels import njit
+
+
+@njit(cache=True)
+def cross_product(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def plus(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(cache=True)
+def minus(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True)
+def times(factor, a):
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@njit(cache=True)
+def unit(v):
+    length = np.sqrt(dot(v, v))
+    return (v[0] / length, v[1] / length, v[2] / length) if length > 0.0 else v
+
+
+@njit(cache=True)
+def vector_at(i, array):
+    return array[i, 0], array[i, 1], array[i, 2]
+
+
+@njit(cache=True)
+def towards(k, m, n, points):
+    """From sphere k to vertex m: the vector between centres, or the outward direction of a wall."""
+    if m < n:
+        return points[m, 0] - points[k, 0], points[m, 1] - points[k, 1], points[m, 2] - points[k, 2]
+    return points[m, 0], points[m, 1], points[m, 2]
+
+
+@njit(cache=True)
+def wall_distance(k, wall, points, sizes):
+    """Distance from the centre of sphere k to a wall."""
+    return sizes[wall] - (
+        points[wall, 0] * points[k, 0] + points[wall, 1] * points[k, 1] + points[wall, 2] * points[k, 2]
+    )

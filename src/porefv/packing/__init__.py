@@ -1,0 +1,8 @@
+"""Packings of spheres: the spheres, their box, what they fill, where they overlap, and their files."""
+
+from porefv.packing.box import WALLS, Box
+from porefv.packing.files import read_packing, write_packing
+from porefv.packing.overlaps import Overlaps
+from porefv.packing.packing import Packing, Source
+
+__all__ = ["WALLS", "Box", "Overlaps", "Packing", "Source", "read_packing", "write_packing"]

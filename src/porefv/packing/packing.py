@@ -1,0 +1,313 @@
+"""Packing: spheres in a box with six walls; what they fill, where they overlap, and whether they fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from porefv.errors import ComputationError, InputError, counted, vector
+from porefv.packing.box import WALLS, Box, Floats, read_only
+from porefv.packing.neighbours import neighbour_pairs
+from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume
+from porefv.packing.triple_overlaps import triple_overlaps
+
+_MOST_SHOWN = 5  # culprits listed in one error
+
+# Lengths whose sixth powers a double holds, which is what the geometry of throats multiplies; and the smallest radius,
+# relative to the box, whose place in it rounding leaves.
+SHORTEST, LONGEST, FINEST = 1e-30, 1e30, 1e-15
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The file a packing was read from, so that errors can name the line of a sphere.
+
+    Parameters
+    ----------
+    path : path
+    lines : (n,) integer array, optional
+        Line of each sphere, counted from 1; None for binary formats.
+    """
+
+    path: str | PathLike[str]
+    lines: NDArray[np.integer] | None = None
+
+    def name(self, sphere: int) -> str:
+        """``line 7 (sphere 5)``, or ``sphere 5`` if there are no lines."""
+        return f"sphere {sphere}" if self.lines is None else f"line {self.lines[sphere]} (sphere {sphere})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Packing:
+    """Spheres, and the box whose six walls confine them.
+
+    Spheres are known by their position in `centres`. The arrays are copied, converted to float64, and
+    read-only.
+
+    Parameters
+    ----------
+    centres : (n, 3) array, m
+    radii : (n,) array, m
+    box : Box, optional
+        Needed by everything about porosity and flow.
+    source : Source, optional
+        File the spheres come from, to be named in errors.
+    metadata : dict, optional
+        Texts found in the file.
+
+    Raises
+    ------
+    InputError
+        If there is no sphere, a shape is wrong, a value is not finite, or a radius is not positive. Whether
+        the spheres fit one another and the box is left to `validate`.
+
+    Examples
+    --------
+    >>> Packing(centres=[[0.5, 0.5, 0.5]], radii=[0.5], box=Box([0, 0, 0], [1, 1, 1]))
+    Packing(1 sphere, radius 0.5 m, box 1×1×1 m)
+    """
+
+    centres: Floats
+    radii: Floats
+    box: Box | None
+    source: Source | None
+    metadata: dict[str, str]
+
+    def __init__(
+        self,
+        centres: ArrayLike,
+        radii: ArrayLike,
+        box: Box | None = None,
+        source: Source | None = None,
+        metadata: dict[str, str] | None = None,
+    ):
+        centres, radii = read_only(centres, "centres"), read_only(radii, "radii")
+        given = {"centres": centres, "radii": radii, "box": box, "source": source, "metadata": metadata or {}}
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
+        if centres.ndim != 2 or centres.shape[1] != 3 or radii.shape != centres.shape[:1]:
+            raise InputError(
+                f"{self._path()}centres must have shape (n, 3) and radii (n,), not {centres.shape} and {radii.shape}."
+            )
+        if len(radii) == 0:
+            raise InputError(f"{self._path()}there is no sphere. Give at least one.")
+        self._refuse(
+            np.flatnonzero(~(np.isfinite(centres).all(axis=1) & np.isfinite(radii))),
+            "values that are not finite",
+            "sphere",
+            lambda i: f"{self._name(i)}: centre {vector(centres[i])}, radius {radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
+        self._refuse(
+            np.flatnonzero(radii <= 0),
+            "radius not positive",
+            "sphere",
+            lambda i: f"{self._name(i)}: radius {radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
+
+    @classmethod
+    def read(cls, path: str | PathLike[str], format: str | None = None, box: Box | None = None) -> Packing:
+        """Read a packing file: see `porefv.packing.read_packing`."""
+        from porefv.packing.files.registry import read_packing
+
+        return read_packing(path, format=format, box=box)
+
+    def write(self, path: str | PathLike[str], format: str | None = None) -> None:
+        """Write a packing file: see `porefv.packing.write_packing`."""
+        from porefv.packing.files.registry import write_packing
+
+        write_packing(self, path, format=format)
+
+    def with_box(self, box: Box) -> Packing:
+        """The same spheres in another box."""
+        return replace(self, box=box)
+
+    @cached_property
+    def overlaps(self) -> Overlaps:
+        """Pairs of spheres that overlap, and spheres that cross walls (none without a box)."""
+        try:
+            pairs = neighbour_pairs(self.centres, self.radii)
+        except InputError as error:
+            raise InputError(f"{self._path()}{error}") from None
+        i, j = pairs.T
+        depths = self.radii[i] + self.radii[j] - np.linalg.norm(self.centres[j] - self.centres[i], axis=1)
+        wall_depths = self.radii[:, None] - self._wall_distances()
+        spheres, walls = np.nonzero(wall_depths > 0)
+        return Overlaps(pairs, depths, spheres.astype(np.int32), walls.astype(np.int32), wall_depths[spheres, walls])
+
+    @cached_property
+    def solid_volume(self) -> float:
+        """Volume of the union of the spheres, inside the box if there is one, m³.
+
+        Balls, less the lens shared by each overlapping pair, less the cap beyond each wall. Exact where no
+        point belongs to three of these at once, which moderate overlaps never reach.
+        """
+        found = self.overlaps
+        i, j = found.pairs.T
+        balls = 4 / 3 * np.pi * self.radii**3
+        lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
+        caps = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        return float(balls.sum() - lenses.sum() - caps.sum())
+
+    @cached_property
+    def _triple_overlaps(self) -> tuple[int, float]:
+        found = self.overlaps
+        i, j = found.pairs.T
+        lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
+        crossings, caps = np.zeros((2, len(self), 6))
+        crossings[found.wall_spheres, found.wall_ids] = found.wall_depths
+        caps[found.wall_spheres, found.wall_ids] = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        return triple_overlaps(found.pairs, self.centres, self.radii, lenses, crossings, caps)
+
+    @property
+    def triple_overlaps(self) -> int:
+        """Number of triples, of spheres or of spheres and walls, with a point in common; if any, volumes are bounds."""
+        return int(self._triple_overlaps[0])
+
+    @property
+    def porosity_error(self) -> float:
+        """By how much `porosity` may exceed the true one: what triples share, at most; 0 where there are none."""
+        return float(self._triple_overlaps[1]) / self._require_box().volume
+
+    @cached_property
+    def porosity(self) -> float:
+        """Fraction of the box outside the spheres; where three meet in a point, no less than that (`porosity_error`).
+
+        Raises
+        ------
+        ComputationError
+            If spheres overlap so deeply that sums over pairs say less than nothing.
+        """
+        porosity = 1.0 - self.solid_volume / self._require_box().volume
+        if not -1e-9 <= porosity <= 1.0 and self.triple_overlaps:
+            raise ComputationError(
+                f"{self._path()}spheres overlap so deeply, {self.triple_overlaps} triples of them in common points, "
+                "that their volume cannot be told from that of pairs. Make their radii smaller."
+            )
+        return porosity
+
+    def validate(self, wall_tolerance: float = 0.05) -> Packing:
+        """Check that the spheres fit one another and the box.
+
+        Moderate overlap (cemented or compressed grains) is legitimate: two spheres may overlap until the
+        centre of one lies in the other, and a sphere may reach beyond a wall by a fraction of its radius.
+        Centres lie strictly inside the box.
+
+        Parameters
+        ----------
+        wall_tolerance : float
+            Largest accepted reach beyond a wall, as a fraction of the radius.
+
+        Returns
+        -------
+        Packing
+            This one.
+
+        Raises
+        ------
+        InputError
+            Names up to five culprits, and counts them all.
+        """
+        if not wall_tolerance >= 0:
+            raise InputError(f"wall_tolerance must be a number >= 0, not {wall_tolerance}.")
+        box = self._require_box()
+        if not (SHORTEST <= box.size.min() and box.size.max() <= LONGEST):
+            raise InputError(
+                f"{self._path()}the box has sides {vector(box.size)} m; they must lie between {SHORTEST:g} and "
+                f"{LONGEST:g} m. Give lengths in another unit."
+            )
+        finest = FINEST * box.size.max()
+        self._refuse(
+            np.flatnonzero((self.radii < finest) | (self.radii > LONGEST)),
+            f"radius not between {finest:.3g} m, which is {FINEST:g} of the box, and {LONGEST:g} m",
+            "sphere",
+            lambda i: f"{self._name(i)}: radius {self.radii[i]:.9g}",
+            "Correct or remove these spheres.",
+        )
+        distances = self._wall_distances()
+        nearest = distances.argmin(axis=1)
+        beyond = self.radii - distances.min(axis=1)
+        enlarge = (
+            f"Correct or remove these spheres, or give a box larger than {vector(box.lower)} to {vector(box.upper)}."
+        )
+        self._refuse(
+            np.flatnonzero((distances <= 0).any(axis=1)),
+            "centre not inside the box",
+            "sphere",
+            lambda i: f"{self._name(i)}: centre {vector(self.centres[i])} is on or beyond {WALLS[nearest[i]]}",
+            enlarge,
+        )
+        self._refuse(
+            np.flatnonzero(beyond > wall_tolerance * self.radii),
+            f"sphere reaches beyond a wall by more than {wall_tolerance:.6g} of its radius",
+            "sphere",
+            lambda i: (
+                f"{self._name(i)}: {beyond[i]:.6g} m beyond {WALLS[nearest[i]]}, "
+                f"{beyond[i] / self.radii[i]:.3g} of its radius {self.radii[i]:.6g} m"
+            ),
+            enlarge,
+        )
+        pairs = self.overlaps.pairs
+        self._refuse(
+            np.flatnonzero(self.overlaps.depths >= self.radii[pairs].min(axis=1)),
+            "overlap so deep that the centre of one sphere lies in the other",
+            "pair",
+            lambda k: self._describe_deep(pairs[k, 0], pairs[k, 1], self.overlaps.depths[k]),
+            "Remove one sphere of each pair, or correct centres and radii.",
+        )
+        return self
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def __repr__(self) -> str:
+        smallest, largest = self.radii.min(), self.radii.max()
+        radii = f"radius {smallest:.3g}" if smallest == largest else f"radii {smallest:.3g}...{largest:.3g}"
+        box = "no box" if self.box is None else f"box {self.box.sides}"
+        return f"Packing({counted(len(self), 'sphere')}, {radii} m, {box})"
+
+    def _wall_distances(self) -> Floats:
+        """(n, 6) distance of each centre from each wall, m, positive inside; (n, 0) without a box."""
+        return np.empty((len(self), 0)) if self.box is None else self.box.wall_distances(self.centres)
+
+    def _require_box(self) -> Box:
+        if self.box is None:
+            raise InputError(
+                f"{self._path()}the packing has no box. Give one: lines '# box_lower = x y z' and "
+                "'# box_upper = x y z' in a CSV or Yade file, [box] with lower and upper in a scene, "
+                "or packing.with_box(Box(lower, upper)) in Python."
+            )
+        return self.box
+
+    def _refuse(self, culprits: NDArray, what: str, kind: str, describe: Callable[[int], str], remedy: str) -> None:
+        """Raise an InputError that shows some of the culprits, if there are any."""
+        if len(culprits) == 0:
+            return
+        lines = [f"{self._path()}{what} ({counted(len(culprits), kind)}):"]
+        lines += [f"  {describe(culprit)}" for culprit in culprits[:_MOST_SHOWN]]
+        if len(culprits) > _MOST_SHOWN:
+            lines.append(f"  ... and {len(culprits) - _MOST_SHOWN} more")
+        raise InputError("\n".join([*lines, remedy]))
+
+    def _describe_deep(self, i: int, j: int, depth: float) -> str:
+        """A pair whose overlap is at least the smaller radius."""
+        small, big = (i, j) if self.radii[i] < self.radii[j] else (j, i)
+        if (self.centres[i] == self.centres[j]).all():
+            how = f"same centre {vector(self.centres[i])}"
+        elif depth >= 2 * self.radii[small]:
+            how = f"sphere {small} lies inside sphere {big}"
+        else:
+            how = f"the centre of sphere {small} lies in sphere {big}"
+        return f"{self._name(i)} and {self._name(j)}: {how}"
+
+    def _name(self, sphere: int) -> str:
+        return (self.source or Source("")).name(sphere)
+
+    def _path(self) -> str:
+        return f"{self.source.path}: " if self.source else ""

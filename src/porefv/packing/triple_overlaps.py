@@ -1,0 +1,106 @@
+"""Points that belong to three spheres at once, or to two and the outside of the box: what sums over pairs leave out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from porefv.packing.box import WALL_AXES, WALL_SENSES
+from porefv.system.kernels import njit
+
+
+@njit(cache=True)
+def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
+    """How many triples have a point in common, and a bound on the sum of the volumes that they share.
+
+    A triple is three spheres, two spheres and a wall, or one sphere and two walls that meet. It shares no more than the
+    smallest lens or cap of its pairs.
+
+    Parameters
+    ----------
+    pairs : (m, 2) int array
+        Overlapping spheres i < j, in lexicographic order.
+    centres, radii : (n, 3), (n,) arrays
+    lenses : (m,) array
+        Volume shared by each pair.
+    crossings : (n, 6) array
+        How far each sphere reaches beyond each wall; not positive where it does not.
+    caps : (n, 6) array
+        Volume of each sphere beyond each wall.
+    """
+    n = radii.shape[0]
+    first = np.zeros(n + 1, np.int64)
+    for p in range(pairs.shape[0]):
+        first[pairs[p, 0] + 1] += 1
+    for i in range(n):
+        first[i + 1] += first[i]
+    count = 0
+    shared = 0.0
+    for i in range(n):
+        for a in range(first[i], first[i + 1]):
+            j = pairs[a, 1]
+            for b in range(a + 1, first[i + 1]):
+                k = pairs[b, 1]
+                c = first[j]
+                while c < first[j + 1] and pairs[c, 1] != k:
+                    c += 1
+                if c < first[j + 1] and _meet(i, j, k, centres, radii):
+                    count += 1
+                    shared += min(lenses[a], lenses[b], lenses[c])
+            for w in range(6):
+                if crossings[i, w] > 0.0 and crossings[j, w] > 0.0 and _reach(i, j, w, centres, radii, crossings) > 0.0:
+                    count += 1
+                    shared += min(lenses[a], caps[i, w], caps[j, w])
+        for w in range(6):
+            for v in range(w + 1, 6):
+                if WALL_AXES[w] == WALL_AXES[v] or crossings[i, w] <= 0.0 or crossings[i, v] <= 0.0:
+                    continue
+                if (radii[i] - crossings[i, w]) ** 2 + (radii[i] - crossings[i, v]) ** 2 < radii[i] ** 2:
+                    count += 1
+                    shared += min(caps[i, w], caps[i, v])
+    return count, shared
+
+
+@njit(cache=True)
+def _meet(i, j, k, centres, radii):
+    """Whether three balls, no one within another, have a point in common.
+
+    They do in the plane of their centres, where a point on two of the circles lies in the third disc; if not, the
+    lens of two is so thin that it lies within the third.
+    """
+    u = centres[j] - centres[i]
+    v = centres[k] - centres[i]
+    d = np.sqrt(np.dot(u, u))
+    e1 = u / d
+    x = np.dot(v, e1)
+    y = np.sqrt(max(np.dot(v, v) - x * x, 0.0))
+    places = np.array([[0.0, 0.0], [d, 0.0], [x, y]])
+    sizes = np.array([radii[i], radii[j], radii[k]])
+    for a in range(3):
+        b = (a + 1) % 3
+        c = (a + 2) % 3
+        along = places[b] - places[a]
+        length = np.sqrt(np.dot(along, along))
+        foot = 0.5 * (length + (sizes[a] - sizes[b]) * (sizes[a] + sizes[b]) / length)
+        half = np.sqrt(max(sizes[a] * sizes[a] - foot * foot, 0.0))
+        for sense in (-1.0, 1.0):
+            px = places[a, 0] + (foot * along[0] - sense * half * along[1]) / length - places[c, 0]
+            py = places[a, 1] + (foot * along[1] + sense * half * along[0]) / length - places[c, 1]
+            if px * px + py * py < sizes[c] * sizes[c] * (1.0 - 1e-12):
+                return True
+    return False
+
+
+@njit(cache=True)
+def _reach(i, j, w, centres, radii, crossings):
+    """How far the lens of two spheres reaches beyond a wall that both cross."""
+    u = centres[j] - centres[i]
+    length = np.sqrt(np.dot(u, u))
+    up = WALL_SENSES[w] * u[WALL_AXES[w]] / length
+    foot = 0.5 * (length + (radii[i] - radii[j]) * (radii[i] + radii[j]) / length)
+    # The outermost point of a ball, where it lies in the other; else one of the circle that both surfaces share.
+    if radii[i] * up >= foot:
+        return crossings[i, w]
+    if -radii[j] * up >= length - foot:
+        return crossings[j, w]
+    half = np.sqrt(max(radii[i] * radii[i] - foot * foot, 0.0))
+    return crossings[i, w] - radii[i] + foot * up + half * np.sqrt(max(1.0 - up * up, 0.0))

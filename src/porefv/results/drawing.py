@@ -1,0 +1,42 @@
+"""The picture of a results directory, as a PNG file."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from porefv.errors import InputError
+from porefv.export.pictures import SIZE, picture
+from porefv.flow.walls import Walls
+from porefv.results.reading import Results
+from porefv.system.atomic_files import atomic_write
+
+
+def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SIZE) -> None:
+    """Write a PNG picture of a results directory.
+
+    Raises
+    ------
+    InputError
+        If the results have no VTK files, or the picture cannot be written.
+    ComputationError
+        If this machine cannot draw.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
+    summary = results.summary
+    title = f"{Path(summary['scene']).stem}: " if summary["scene"] else ""
+    title += f"{summary['packing']['spheres']} spheres"
+    if "permeability" in summary:
+        title += f",  k = {summary['permeability']:.4g} m²"
+    with atomic_write(path) as temporary:
+        picture(
+            results.spheres,
+            results.pores,
+            walls=Walls.from_mapping(summary.get("walls", {})),
+            title=title,
+            size=size,
+        ).screenshot(temporary)

@@ -1,0 +1,90 @@
+"""A results directory read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from porefv.errors import InputError
+from porefv.results.force_table import read_forces
+from porefv.system.optional_imports import load
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+@dataclass(frozen=True)
+class Results:
+    """A results directory.
+
+    Attributes
+    ----------
+    directory : Path
+    summary : dict
+        The content of summary.json.
+    """
+
+    directory: Path
+    summary: dict[str, Any]
+
+    @cached_property
+    def forces(self) -> np.ndarray:
+        """Structured array of forces.csv: a row per sphere, then per wall, whose radius is NaN.
+
+        Raises
+        ------
+        InputError
+            If forces were not asked for.
+        """
+        return read_forces(self._file("forces.csv", 'add "forces" to the quantities'))
+
+    @cached_property
+    def pores(self) -> pyvista.UnstructuredGrid:
+        """The mesh of pores.vtu; InputError without VTK files, as for `spheres` and `throats`."""
+        return self._read_vtk("pores.vtu")
+
+    @cached_property
+    def spheres(self) -> pyvista.PolyData:
+        """The points of spheres.vtp."""
+        return self._read_vtk("spheres.vtp")
+
+    @cached_property
+    def throats(self) -> pyvista.PolyData:
+        """The network of throats.vtp."""
+        return self._read_vtk("throats.vtp")
+
+    def _file(self, name: str, remedy: str) -> Path:
+        path = self.directory / name
+        if not path.is_file():
+            raise InputError(f"{self.directory} has no {name}: {remedy} in the scene's [output], and solve again.")
+        return path
+
+    def _read_vtk(self, name: str) -> Any:
+        path = self._file(name, "set vtk = true")
+        return load("pyvista", f"Reading {name}").read(path)
+
+
+def read(directory: str | PathLike[str]) -> Results:
+    """Read a results directory: its summary now, the rest when asked for.
+
+    Raises
+    ------
+    InputError
+        If it is not a results directory, or its summary is damaged.
+    """
+    directory = Path(directory)
+    path = directory / "summary.json"
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else f"summary.json is damaged ({error})"
+        raise InputError(f"{directory} holds no results of porefv solve: {reason}") from None
+    if not isinstance(summary, dict) or "packing" not in summary:
+        raise InputError(f"{directory} holds no results of porefv solve: its summary.json is another program's")
+    return Results(directory, summary)

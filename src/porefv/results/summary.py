@@ -1,0 +1,171 @@
+"""The content of summary.json: numbers of the whole sample, how they were computed, and how long it took."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import re
+from collections.abc import Collection, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import porefv
+from porefv.errors import ComputationError
+from porefv.packing.box import WALLS
+
+if TYPE_CHECKING:
+    from porefv.flow.pore_flow import PoreFlow
+    from porefv.mesh.pore_mesh import PoreMesh
+
+UNITS = {
+    "permeability": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
+    "wall_flux": "m3/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
+    "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
+}  # fmt: skip
+
+
+def summary_json(
+    mesh: PoreMesh,
+    flow: PoreFlow | None,
+    *,
+    quantities: Collection[str],
+    vtk: bool,
+    seconds: Mapping[str, float],
+    scene: str | None = None,
+    packing: str | None = None,
+) -> str:
+    """The text of summary.json.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    flow : PoreFlow or None
+        None: the pores alone.
+    quantities, vtk
+        What was asked for.
+    seconds : mapping of str to float
+        Wall time of each stage.
+    scene, packing : str, optional
+        Names of the files.
+    """
+    summary = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "scene": scene,
+        "quantities": list(quantities),
+        "packing": {"file": packing, **_packing(mesh)},
+        "mesh": _mesh(mesh),
+        **({} if flow is None else _flow(flow, quantities)),
+        "seconds": {**seconds, "total": sum(seconds.values())},
+        "versions": _versions(vtk),
+        "units": UNITS,
+    }
+    try:
+        text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
+    except ValueError:
+        raise ComputationError("a result is not a finite number, and nothing was written") from None
+    # Vectors on one line. Strings hold no line breaks in JSON, so that none is met here.
+    return re.sub(r"\[\n\s+([^][{}]*?)\n\s+\]", _on_one_line, text) + "\n"
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    return "[" + re.sub(r",\n\s+", ", ", found[1]) + "]"
+
+
+def _packing(mesh: PoreMesh) -> dict[str, Any]:
+    packing = mesh.packing
+    return {
+        "spheres": len(packing),
+        "hidden_spheres": len(mesh.triangulation.hidden),
+        "overlapping_pairs": len(packing.overlaps.pairs),
+        "overlapping_triples": packing.triple_overlaps,
+        "radii": [packing.radii.min(), packing.radii.max()],
+        "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
+        "porosity": packing.porosity,
+        "porosity_error": packing.porosity_error,
+        "pore_volume": packing.porosity * mesh.box.volume,
+    }
+
+
+def _mesh(mesh: PoreMesh) -> dict[str, Any]:
+    return {
+        "cells": mesh.n_cells,
+        "pores": mesh.n_pores,
+        "united_pores": mesh.n_united,
+        "throats": len(mesh.throats),
+        "unite_tolerance": mesh.unite_tolerance,
+    }
+
+
+def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
+    walls = {
+        name: {"pressure": wall.pressure, "slip": bool(wall.slip)} for name, wall in zip(WALLS, flow.walls, strict=True)
+    }
+    found: dict[str, Any] = {
+        "fluid": {"viscosity": flow.fluid.viscosity, "density": flow.fluid.density},
+        "walls": walls,
+        "flow": {
+            "conductance": flow.conductance.name,
+            "conductance_model": repr(flow.conductance),
+            "gravity": flow.gravity,
+            "inflow": flow.inflow,
+            "outflow": flow.outflow,
+            "imbalance": flow.imbalance,
+            "closing_error": flow.closing_error,
+            "wall_flux": flow.wall_flux,
+        },
+        "unusual": _unusual(flow),
+        "solver": {name: _known(value) for name, value in vars(flow.solver_report).items()},
+    }
+    if "permeability" in quantities:
+        found["permeability"] = flow.permeability
+        found["hydraulic_conductivity"] = flow.hydraulic_conductivity
+    if "forces" in quantities:
+        forces = flow.forces
+        found["forces"] = {
+            "sums": forces.sums,
+            "thrust": forces.thrust,
+            "conservation_residual": forces.conservation_residual,
+        }
+    return found
+
+
+def _unusual(flow: PoreFlow) -> dict[str, int]:
+    """Counts of throats and pores that need a rule of their own, by what has been computed of them."""
+    throats = flow.mesh.throats
+    counts = {
+        "pores_of_several_pressures": flow.pores_of_several_pressures,
+        "closed_throats": throats.closed,
+        "throats_without_length": throats.lengths <= 0.0,
+        "throats_without_conductance": flow.conductances == 0.0,
+        "isolated_pores": flow.solution.isolated,
+    }
+    if "volumes" in vars(throats):  # the conductance model has asked for them
+        counts["throats_without_volume"] = throats.volumes <= 0.0
+        surfaces = throats.wetted_surfaces(flow.walls.slip)
+        counts["throats_without_surface"] = surfaces <= 0.0
+        # No passage in a box has a hydraulic radius as large as the box: the spheres beside it are dust.
+        counts["throats_wider_than_the_box"] = throats.volumes > np.maximum(surfaces, 0.0) * flow.mesh.box.size.min()
+    return {name: int(np.count_nonzero(found)) for name, found in counts.items()}
+
+
+def _versions(vtk: bool) -> dict[str, str]:
+    found = {"porefv": porefv.__version__, "python": platform.python_version()}
+    for name in ("numpy", "scipy", "numba", *(["vtk"] if vtk else [])):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist()  # numpy's arrays and numbers
+
+
+def _known(value: Any) -> Any:
+    """The value; None for a number that is not known."""
+    return None if isinstance(value, float) and math.isnan(value) else value

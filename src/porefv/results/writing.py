@@ -1,0 +1,177 @@
+"""A results directory: written whole or not at all.
+
+A directory holds what was asked for of::
+
+    summary.json   numbers of the whole sample, what was done and how long it took
+    forces.csv     forces on every sphere, then on the six walls
+    pores.vtu      the space-filling mesh: pressure, void volume and velocity of the pores
+    spheres.vtp    centres with radii and forces
+    throats.vtp    the network: flux, conductance, hydraulic radius and length of the throats
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from porefv.errors import InputError
+from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
+from porefv.export.vtk_files import vtk_data_model, write_xml
+from porefv.flow.pore_flow import PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.results.force_table import PARTS, write_forces
+from porefv.results.summary import summary_json
+from porefv.system.atomic_files import atomic_directory
+from porefv.system.progress import Progress
+
+QUANTITIES = ("permeability", "pressure", "forces")
+FILES = ("summary.json", "forces.csv", "pores.vtu", "spheres.vtp", "throats.vtp")
+
+
+def write(
+    flow: PoreFlow,
+    directory: str | PathLike[str],
+    *,
+    quantities: Collection[str] = QUANTITIES,
+    vtk: bool = True,
+    force: bool = False,
+) -> Path:
+    """Compute what is asked for, as far as it is not yet, and write a results directory.
+
+    Parameters
+    ----------
+    flow : PoreFlow
+    directory : path
+        Made with its parents; must not exist, or be empty.
+    quantities : collection of str
+        Among `QUANTITIES`.
+    vtk : bool
+        Write pores.vtu, spheres.vtp and throats.vtp.
+    force : bool
+        Replace results that exist.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, or if the results cannot be written: before anything is computed.
+    """
+    unknown = [quantity for quantity in quantities if quantity not in QUANTITIES]
+    if unknown:
+        raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
+    with writing(directory, force=force, vtk=vtk) as folder:
+        save(folder, flow.mesh, flow, quantities=quantities, vtk=vtk)
+    return Path(directory)
+
+
+@contextmanager
+def writing(directory: str | PathLike[str], *, force: bool, vtk: bool) -> Iterator[Path]:
+    """A temporary folder that becomes the results directory if the block succeeds; see `check_target`."""
+    check_target(directory, vtk=vtk)
+    with atomic_directory(directory, force=force) as folder:
+        yield folder
+
+
+def check_target(directory: str | PathLike[str], *, vtk: bool) -> None:
+    """Refuse, before anything is computed, a directory that cannot be written or replaced.
+
+    Raises
+    ------
+    InputError
+        If it holds results and other things besides, or its parent is not writable.
+    MissingExtraError
+        If `vtk` is asked for and VTK is not installed.
+    """
+    if vtk:
+        vtk_data_model()
+    directory = Path(directory)
+    try:
+        content = sorted(os.listdir(directory)) if directory.is_dir() else []
+        existing = next(parent for parent in directory.absolute().parents if parent.exists())
+    except OSError as error:
+        raise InputError(f"cannot write {directory}: {error.strerror}.") from None
+    foreign = [name for name in content if name not in FILES]
+    if "summary.json" in content and foreign:
+        raise InputError(
+            f"{directory} holds {foreign[0]}, which is not a file of the results, and would be lost. "
+            "Move it, or choose another directory."
+        )
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        raise InputError(f"cannot write {directory}: {existing} is not a directory that may be written to.")
+
+
+def stages(quantities: Collection[str], vtk: bool) -> tuple[str, ...]:
+    """Stages of `save`, in order."""
+    asked = {
+        "throats": bool(quantities),
+        "pressure": bool(quantities),
+        "forces": "forces" in quantities,
+        "velocities": vtk and "pressure" in quantities,
+    }
+    return ("triangulation", *(stage for stage, wanted in asked.items() if wanted), "writing")
+
+
+def save(
+    folder: Path,
+    mesh: PoreMesh,
+    flow: PoreFlow | None,
+    *,
+    quantities: Collection[str],
+    vtk: bool,
+    progress: Progress | None = None,
+    scene: str | None = None,
+    packing: str | None = None,
+) -> None:
+    """Compute, stage by stage, and write into an empty folder; without a flow, the mesh alone."""
+    progress = progress or Progress(quiet=True)
+    with progress.stage("triangulation"):
+        mesh.n_pores  # noqa: B018 - computed here
+    if flow is not None:
+        with progress.stage("throats"):
+            flow.conductances  # noqa: B018
+        with progress.stage("pressure"):
+            flow.solution  # noqa: B018
+        if "forces" in quantities:
+            with progress.stage("forces"):
+                flow.forces  # noqa: B018
+        if vtk and "pressure" in quantities:
+            with progress.stage("velocities"):
+                flow.pore_velocity  # noqa: B018
+    with progress.stage("writing"):
+        if flow is not None and "forces" in quantities:
+            write_forces(flow, folder / "forces.csv")
+        if vtk:
+            _write_vtk(folder, mesh, flow, quantities)
+    text = summary_json(
+        mesh, flow, quantities=quantities, vtk=vtk, seconds=progress.seconds, scene=scene, packing=packing
+    )
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+
+
+def _write_vtk(folder: Path, mesh: PoreMesh, flow: PoreFlow | None, quantities: Collection[str]) -> None:
+    pores = {"volume": mesh.pore_volumes}
+    throats = {
+        "length": mesh.throats.lengths,
+        "area": mesh.throats.areas,
+        "fluid_area": mesh.throats.fluid_areas,
+    }
+    spheres = {}
+    if flow is not None:
+        surfaces = mesh.throats.wetted_surfaces(flow.walls.slip)
+        throats["hydraulic_radius"] = np.divide(
+            mesh.throats.volumes, surfaces, out=np.zeros(len(surfaces)), where=surfaces > 0.0
+        )
+        throats["conductance"] = flow.conductances
+        throats["flux"] = flow.flux
+        if "pressure" in quantities:
+            pores["pressure"] = flow.pressure
+            pores["velocity"] = flow.pore_velocity
+        if "forces" in quantities:
+            spheres = {f"{part}_force": getattr(flow.forces, part) for part in PARTS}
+    write_xml(cells_grid(mesh, **pores), folder / "pores.vtu")
+    write_xml(spheres_polydata(mesh.packing, **spheres), folder / "spheres.vtp")
+    write_xml(throats_polydata(mesh.throats, **throats), folder / "throats.vtp")

@@ -1,0 +1,178 @@
+"""What is measured on the way: a row of the series, layers of the profiles, permeability, balance of momentum."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from porefv.conductance.model import ConductanceModel
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.micromechanics import layer_means
+from porefv.dem.dem import DEM
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Wall, Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
+
+_ENERGIES = ("kinetic", "elastic", "potential", "sliding", "damping", "walls", "applied", "balance")
+_POWERS = ("grains", "walls", "dissipation", "boundary", "imbalance")
+
+
+def _by_wall(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{wall}" for wall in WALLS)
+
+
+GRAIN_COLUMNS = (
+    "step", "time", "stage",
+    *_by_wall("place"), *_by_wall("contact_stress"),
+    "strain_x", "strain_y", "strain_z", "porosity", "coordination", "unbalanced",
+    *(f"energy_{name}" for name in _ENERGIES), "momentum_residual",
+)  # fmt: skip
+FLUID_COLUMNS = (
+    *_by_wall("fluid_force"), *_by_wall("total_stress"), *_by_wall("flux"),
+    "mean_pressure", "max_pressure",
+    *(f"power_{name}" for name in _POWERS), "iterations", "meshes",
+)  # fmt: skip
+PROFILE_COLUMNS = ("step", "time", "stage", "layer", "lower", "upper", "pressure", "effective_stress")
+
+
+def grain_row(dem: DEM, coupling: Coupling | None, sizes: np.ndarray, residual: float) -> dict[str, float]:
+    """`GRAIN_COLUMNS` but for the stage; `sizes` (3,) are the box's that strains refer to [m]."""
+    stress, energies = dem.wall_stress, dem.energies
+    row: dict[str, float] = {"step": dem.steps, "time": dem.time}
+    row |= {f"place_{wall}": place for wall, place in zip(WALLS, dem.places.tolist(), strict=True)}
+    row |= {f"contact_stress_{wall}": stress[wall] for wall in WALLS}
+    row |= {f"strain_{axis}": s for axis, s in zip("xyz", (1.0 - dem.box.size / sizes).tolist(), strict=True)}
+    row |= {"porosity": dem.porosity, "coordination": dem.coordination}
+    row["unbalanced"] = unbalanced(dem, coupling)
+    row |= {f"energy_{name}": getattr(energies, name) for name in _ENERGIES}
+    return row | {"momentum_residual": residual}
+
+
+def fluid_row(coupling: Coupling, dem: DEM) -> dict[str, float]:
+    """`FLUID_COLUMNS`."""
+    fluxes, power, total = coupling.wall_flux, coupling.power, total_stresses(dem, coupling)
+    pressure, volumes = coupling.pressure, coupling.mesh.pore_volumes
+    thrusts = _thrusts(coupling).tolist()
+    row: dict[str, float] = {f"fluid_force_{wall}": force for wall, force in zip(WALLS, thrusts, strict=True)}
+    row |= {f"total_stress_{wall}": stress for wall, stress in total.items()}
+    row |= {f"flux_{wall}": flux for wall, flux in fluxes.items()}
+    row |= {"mean_pressure": float(np.dot(pressure, volumes) / volumes.sum()), "max_pressure": float(pressure.max())}
+    row |= {f"power_{name}": value for name, value in asdict(power).items()}
+    row |= {"power_imbalance": power.imbalance}
+    return row | {"iterations": coupling.effort.iterations, "meshes": coupling.effort.meshes}
+
+
+def total_stresses(dem: DEM, coupling: Coupling | None) -> dict[str, float]:
+    """Normal stress of contacts and fluid together on each wall [Pa]."""
+    stresses = dem.wall_stress
+    if coupling is None:
+        return stresses
+    thrusts = _thrusts(coupling)
+    return {
+        name: stresses[name] + thrust / area
+        for name, thrust, area in zip(WALLS, thrusts, dem.box.wall_areas, strict=True)
+    }
+
+
+def _thrusts(coupling: Coupling) -> np.ndarray:
+    """(6,): force of the fluid on each wall, along its outward normal [N]."""
+    return coupling.wall_fluid_forces[np.arange(6), WALL_AXES] * WALL_SENSES
+
+
+# ---- balance ----------------------------------------------------------------------------------------------------
+
+
+def momentum(dem: DEM) -> np.ndarray:
+    """(3,): Σ m v half a step ago [kg m/s]."""
+    return dem.masses @ dem.velocities
+
+
+def momentum_residual(dem: DEM, coupling: Coupling | None, before: np.ndarray) -> float:
+    """How far grains, walls and fluid are from Newton's second law over the last step, relative to the forces.
+
+    Parameters
+    ----------
+    before : (3,) array
+        `momentum` before the step [kg m/s].
+
+    Notes
+    -----
+    Contacts between grains cancel, and so does what the fluid does to grains and walls together: the rate of momentum
+    is the weight and what is applied, less the forces on the walls. Damping takes momentum besides: NaN.
+    """
+    if dem.damping > 0.0:
+        return np.nan
+    rate = (momentum(dem) - before) / dem.step
+    outside = dem.masses.sum() * dem.gravity + dem.applied.sum(axis=0)
+    on_walls = dem.last_wall_forces
+    if coupling is not None:
+        on_walls = np.concatenate([on_walls, coupling.wall_fluid_forces])
+    scale = np.abs(rate).sum() + np.abs(outside).sum() + np.abs(on_walls).sum()
+    if scale == 0.0:
+        return 0.0
+    return float(np.abs(rate - outside + on_walls.sum(axis=0)).max() / scale)
+
+
+def unbalanced(dem: DEM, coupling: Coupling | None) -> float:
+    """`DEM.unbalanced`, with the force of the fluid on each grain among the forces."""
+    if coupling is None:
+        return dem.unbalanced
+    kept = dem.applied
+    dem.apply(kept + coupling.fluid_forces)
+    with_fluid = dem.unbalanced
+    dem.apply(kept)
+    return with_fluid
+
+
+# ---- profiles ---------------------------------------------------------------------------------------------------
+
+
+def profile_rows(dem: DEM, coupling: Coupling | None, axis: int, layers: int) -> list[dict[str, float]]:
+    """`PROFILE_COLUMNS` of each layer, but for the stage; layers are equally thick, across an axis of the box now."""
+    edges = np.linspace(dem.box.lower[axis], dem.box.upper[axis], layers + 1)
+    pressures = np.full(layers, np.nan)
+    if coupling is not None:
+        mesh = coupling.mesh
+        # Pressures are those at the Laguerre vertices, of which some lie a little beyond the walls.
+        places = np.clip(mesh.vertices[:, axis], edges[0], edges[-1])
+        pressures = layer_means(places, coupling.cell_pressure, mesh.cell_volumes, edges)
+    stresses = layer_stresses(dem, axis, edges)
+    return [
+        {
+            "step": dem.steps, "time": dem.time, "layer": k + 1, "lower": edges[k], "upper": edges[k + 1],
+            "pressure": pressures[k], "effective_stress": stresses[k],
+        }
+        for k in range(layers)
+    ]  # fmt: skip
+
+
+def layer_stresses(dem: DEM, axis: int, edges: np.ndarray) -> np.ndarray:
+    """(l,): normal stress that contacts bear across each layer, positive in compression [Pa].
+
+    The force through a plane is that of the contacts whose branch crosses it; its mean over the planes of a layer
+    counts each contact with the part of its branch that lies in the layer. Over the whole box this is `DEM.stress`.
+    """
+    contacts, x = dem.contacts, dem.positions
+    n = len(dem)
+    i, j = contacts.grains.T
+    ends = np.where((j < n)[:, None], x[np.minimum(j, n - 1)], contacts.points)
+    a, b = x[i, axis], ends[:, axis]
+    lower, upper = np.minimum(a, b), np.maximum(a, b)
+    # Force on the side that is lower on the axis.
+    push = np.where(b > a, -1.0, 1.0) * contacts.forces[:, axis]
+    inside = np.minimum(upper[:, None], edges[1:]) - np.maximum(lower[:, None], edges[:-1])
+    return (push[:, None] * np.maximum(inside, 0.0)).sum(axis=0) / (np.diff(edges) * dem.box.section(axis))
+
+
+# ---- permeability -----------------------------------------------------------------------------------------------
+
+
+def permeability(dem: DEM, axis: int, slip: np.ndarray, conductance: ConductanceModel) -> float:
+    """Of the grains where they stand, by steady flow along an axis; `slip` (6,) of the walls [m²]."""
+    walls = {name: Wall(slip=bool(slips)) for name, slips in zip(WALLS, slip, strict=True)}
+    for end, pressure in enumerate((1.0, 0.0)):
+        wall = 2 * axis + end
+        walls[WALLS[wall]] = Wall(pressure, bool(slip[wall]))
+    return PoreFlow(PoreMesh(dem.packing), Walls(**walls), conductance=conductance).permeability

@@ -1,0 +1,126 @@
+"""Time series of a simulation in a picture: pressure, stresses, strain, and profiles across the sample."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from porefv.errors import InputError, MissingExtraError, counted
+from porefv.packing.box import WALLS
+from porefv.simulation.run_record import RunRecord, read_record
+from porefv.simulation.series import PROFILES, read_profiles, read_series
+from porefv.system.atomic_files import atomic_write
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Moments of which profiles are drawn.
+_MOMENTS = 6
+# A colour for each axis, a line style for each of its two walls.
+_COLOURS = {"x": "tab:green", "y": "tab:orange", "z": "tab:blue"}
+
+
+def draw_series(directory: str | PathLike[str], path: str | PathLike[str]) -> None:
+    """Write a PNG picture of the series of a results directory, also while its run goes on.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no series, or the picture cannot be written.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
+    picture = series_picture(directory)
+    with atomic_write(path) as temporary:
+        picture.savefig(temporary, dpi=150)
+
+
+def series_picture(directory: str | PathLike[str]) -> Any:
+    """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`."""
+    try:
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        raise MissingExtraError("matplotlib", "Drawing time series") from None
+    record, series = read_record(directory), read_series(directory)
+    if len(series) == 0:
+        raise InputError(f"{directory} has no rows to draw yet")
+    wet = "mean_pressure" in (series.dtype.names or ())
+    profiles = read_profiles(directory) if (Path(directory) / PROFILES).is_file() else None
+    rows = 2 if wet or profiles is not None else 1
+    figure = Figure(figsize=(12.0, 4.2 * rows), layout="constrained")
+    axes = iter(np.atleast_1d(figure.subplots(rows, 2)).ravel())
+    if wet:
+        _pressures(next(axes), series)
+    _stresses(next(axes), series, wet)
+    _strains(next(axes), series)
+    in_time = list(figure.axes[: 3 if wet else 2])
+    for ax in in_time:
+        _stages(ax, record)
+        ax.set_xlim(series["time"][0], max(series["time"][-1], np.nextafter(series["time"][0], np.inf)))
+        ax.set_xlabel("time, s")
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize=8)
+    if profiles is not None and len(profiles):
+        _profiles(next(axes), profiles, record, "pressure" if wet else "effective_stress")
+    for ax in axes:
+        ax.set_axis_off()
+    title = Path(record.path).stem if record.path else str(directory)
+    figure.suptitle(f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}")
+    return figure
+
+
+def _pressures(ax: Axes, series: np.ndarray) -> None:
+    ax.plot(series["time"], series["mean_pressure"], label="mean")
+    ax.plot(series["time"], series["max_pressure"], label="largest")
+    ax.set_ylabel("pressure of the pores, Pa")
+
+
+def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
+    for wall in WALLS:
+        style: dict[str, Any] = {"color": _COLOURS[wall[0]], "ls": "-" if wall.endswith("max") else "--"}
+        ax.plot(series["time"], series[f"contact_stress_{wall}"], label=wall, **style)
+        if wet:
+            ax.plot(series["time"], series[f"total_stress_{wall}"], lw=3.0, alpha=0.3, **style)
+    ax.set_ylabel("stress on walls, Pa" + (" (contacts; broad: total)" if wet else ""))
+
+
+def _strains(ax: Axes, series: np.ndarray) -> None:
+    for axis, colour in _COLOURS.items():
+        ax.plot(series["time"], 100.0 * series[f"strain_{axis}"], color=colour, label=f"strain {axis}")
+    ax.set_ylabel("settlement, % of the side")
+    ax.invert_yaxis()
+
+
+def _stages(ax: Axes, record: RunRecord) -> None:
+    for span in record.spans[1:]:
+        ax.axvline(span.begin, color="0.6", lw=0.8)
+    for span in record.spans:
+        ax.annotate(
+            f" {span.name}", (span.begin, 0.99), xycoords=("data", "axes fraction"),
+            rotation=90, va="top", fontsize=8, color="0.4",
+        )  # fmt: skip
+
+
+def _profiles(ax: Axes, profiles: np.ndarray, record: RunRecord, quantity: str) -> None:
+    """The quantity across the layers, at moments of the last stage that has it: close at first, as it changes then."""
+    found = profiles[~np.isnan(profiles[quantity])]
+    if not len(found):
+        ax.set_axis_off()
+        return
+    found = found[found["stage"] == found["stage"].max()]
+    times = np.unique(found["time"])
+    for time in times[np.unique(np.geomspace(1, len(times), _MOMENTS).round().astype(int)) - 1]:
+        layers = found[found["time"] == time]
+        ax.plot(layers[quantity], 0.5 * (layers["lower"] + layers["upper"]), ".-", label=f"{time:.4g} s")
+    ax.set_xlabel(f"{quantity.replace('_', ' ')} by layer, Pa, in {record.spans[int(found['stage'][0]) - 1].name}")
+    ax.set_ylabel("place across the layers, m")
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8)

@@ -1,0 +1,429 @@
+"""A simulation: stages, one after the other, recorded on the way, and taken up again where it was stopped."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.walls_in_time import WallHistories
+from porefv.dem.dem import DEM
+from porefv.errors import ComputationError, InputError
+from porefv.export.vtk_files import vtk_data_model
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, Rest, SimulationScene, Stage
+from porefv.simulation import measurements
+from porefv.simulation.frames import Frames
+from porefv.simulation.progress import RunState, SimulationProgress
+from porefv.simulation.run_record import (
+    FRAMES,
+    RunRecord,
+    StageSpan,
+    check_directory,
+    clear,
+    is_simulation,
+    read_record,
+)
+from porefv.simulation.series import PROFILES, SERIES, Series, require_parquet, write_parquet
+from porefv.system.threads import threads
+
+# Most steps at once, and between two looks at whether grains are at rest.
+_STRIDE = 100
+# Steps after which grains that are not at rest will not be, as for `DEM.run_to_rest`.
+_MOST = 200_000
+
+
+def run(
+    scene: SimulationScene, *, force: bool = False, resume: bool = False, progress: SimulationProgress | None = None
+) -> Path:
+    """Go through the stages of a scene.
+
+    Parameters
+    ----------
+    scene : SimulationScene
+    force : bool
+        Replace results that exist.
+    resume : bool
+        Go on from the last checkpoint, as if the run had not been stopped: to the last bit, on the same kind of
+        processor with the same versions. A run that is complete is left as it is. Stages that had not begun may
+        have been changed in the scene, or added.
+    progress : SimulationProgress, optional
+
+    Returns
+    -------
+    Path
+        The results directory.
+
+    Raises
+    ------
+    InputError
+        Before anything is computed or overwritten, where possible.
+    ComputationError
+        If the motion runs away, or grains do not come to rest. What was recorded, and the last checkpoint, stay.
+    KeyboardInterrupt
+        When interrupted: at the end of some steps, after a checkpoint; at once when interrupted again.
+    """
+    progress = progress or SimulationProgress(quiet=True)
+    directory = scene.output.directory
+    if scene.output.parquet:
+        require_parquet()
+    if scene.output.frames is not None:
+        vtk_data_model()
+    record = _to_resume(scene) if resume else None
+    if record is not None and record.status == "complete" and len(record.spans) == len(scene.stages):
+        return directory
+    if record is None:
+        check_directory(directory, force or resume)
+        dem = scene.grains()
+        record = RunRecord(scene.data, str(scene.path) if scene.path else None, dem.box.size.tolist())
+        running = _Run(scene, record, dem, None, progress)
+    else:
+        dem, coupling = record.load(directory)
+        record.scene, record.path = scene.data, str(scene.path) if scene.path else None
+        running = _Run(scene, record, dem, coupling, progress)
+    try:
+        # As many threads as the grains have: more than there is work for cost more than they give.
+        with _interruptions(running), threads(dem.threads):
+            running.go()
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted. {running.stop('interrupted')}") from None
+    except (ComputationError, InputError) as error:
+        kind = ComputationError if isinstance(error, ComputationError) else InputError
+        raise kind(f"{str(error).rstrip('.')}. {running.stop('failed')}") from error
+    finally:
+        running.close()
+    return directory
+
+
+def check(scene: SimulationScene) -> DEM:
+    """Read and validate everything `run` would, moving nothing; the grains at the start.
+
+    Raises
+    ------
+    InputError
+        As `run`, save that results may exist.
+    """
+    check_directory(scene.output.directory, force=True)
+    grains = scene.grains()
+    if any(stage.fluid for stage in scene.stages):
+        PoreMesh(grains.packing)
+    return grains
+
+
+def _to_resume(scene: SimulationScene) -> RunRecord | None:
+    """The record of the run to go on with; None to begin, where no checkpoint has been written yet."""
+    directory = scene.output.directory
+    if not is_simulation(directory):
+        if directory.is_dir() and any(directory.iterdir()):
+            raise InputError(f"{directory} holds no results of porefv simulate to go on with. Choose another directory")
+        return None
+    record = read_record(directory)
+    if record.checkpoint is None:
+        return None
+    was, now, begun = dict(record.scene), dict(scene.data), len(record.spans)
+    keys = sorted({*was, *now} - {"stages", "checkpoint"})
+    changed = [f"[{key}]" for key in keys if was.get(key) != now.get(key)]
+    for k in range(begun):
+        if was["stages"][k] != (now["stages"][k] if k < len(now["stages"]) else None):
+            changed.append(f"stage {k + 1}")
+    if changed:
+        raise InputError(
+            f"{scene.path or 'the scene'} differs from the one that the run in {directory} was started with, in "
+            f"{changed[0]}. Only stages that have not begun may be changed; start the run anew with --force, or give "
+            "the changed scene another directory"
+        )
+    return record
+
+
+@contextmanager
+def _interruptions(running: _Run) -> Iterator[None]:
+    """The first Ctrl-C asks the run to stop at the end of some steps; the second stops it at once."""
+
+    def ask(*_: Any) -> None:
+        if running.asked_to_stop:
+            raise KeyboardInterrupt
+        running.asked_to_stop = True
+
+    try:
+        before = signal.signal(signal.SIGINT, ask)
+    except ValueError:  # not in the main thread: others have to deal with signals
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class _Times:
+    """Steps at which something is due: every so many from one on, and at the ends of stages; or given ones alone."""
+
+    def __init__(self, moments: float | tuple[float, ...] | None, dt: float, begin: int = 0):
+        self.begin, self.every, self.steps = begin, 0, np.zeros(0, int)
+        if isinstance(moments, tuple):
+            self.steps = np.unique(np.rint(np.array(moments) / dt).astype(int))
+        elif moments is not None:
+            self.every = max(1, round(moments / dt))
+
+    def due(self, step: int, ended: bool) -> bool:
+        if self.every:
+            return ended or (step - self.begin) % self.every == 0
+        return bool((self.steps == step).any())
+
+    def next(self, step: int) -> float:
+        """The first step after this one."""
+        if self.every:
+            return step + self.every - (step - self.begin) % self.every
+        later = self.steps[self.steps > step]
+        return int(later[0]) if len(later) else math.inf
+
+
+class _Run:
+    """Grains, fluid and records of a run."""
+
+    def __init__(
+        self,
+        scene: SimulationScene,
+        record: RunRecord,
+        dem: DEM,
+        coupling: Coupling | None,
+        progress: SimulationProgress,
+    ):
+        self.scene, self.record, self.dem, self.coupling, self.progress = scene, record, dem, coupling, progress
+        self.directory = scene.output.directory
+        self.asked_to_stop = False
+        self._clock = time.perf_counter() - record.seconds
+        self._saved = dem.steps, time.perf_counter()
+        self._axis = AXES.index(scene.output.axis)
+        self._walls = WallHistories()
+        self._walls.set(scene.walls, 0.0)
+        for stage, span in zip(scene.stages, record.spans, strict=False):
+            self._walls.set(stage.walls, span.begin)
+        point, output = record.checkpoint, scene.output
+        if point is None:
+            clear(self.directory)
+            record.write(self.directory)
+        columns = measurements.GRAIN_COLUMNS + (measurements.FLUID_COLUMNS if scene.fluid else ())
+        sizes = point.sizes if point else {}
+        self._series = Series(self.directory / SERIES, columns, sizes.get(SERIES))
+        self._profiles: Series | None = None
+        if output.profiles is not None:
+            self._profiles = Series(self.directory / PROFILES, measurements.PROFILE_COLUMNS, sizes.get(PROFILES))
+        self._frames: Frames | None = None
+        if output.frames is not None:
+            self._frames = Frames(self.directory / FRAMES, dem, output.contacts, point.frames if point else {})
+        self._profile_times, self._frame_times = (_Times(x, dem.step) for x in (output.profiles, output.frames))
+
+    # ---- stages -------------------------------------------------------------------------------------------------
+
+    def go(self) -> None:
+        """Go through the stages, from where the run is."""
+        record, stages = self.record, self.scene.stages
+        begun = len(record.spans)
+        if record.checkpoint is not None and not record.checkpoint.ended:
+            with self.progress.stage(stages[begun - 1].name):
+                self._follow(begun - 1)
+        for k in range(begun, len(stages)):
+            self.progress.begin()
+            with self.progress.stage(stages[k].name):
+                self._enter(k)
+                self._follow(k)
+        if self.scene.output.parquet:
+            write_parquet(self.directory)
+        record.status = "complete"
+        self._save(ended=True)
+
+    def _enter(self, k: int) -> None:
+        """Begin a stage: what it changes."""
+        stage, dem = self.scene.stages[k], self.dem
+        self.record.spans.append(StageSpan(stage.name, dem.steps, dem.time))
+        self.record.status = "running"
+        self._walls.set(stage.walls, dem.time)
+        if stage.plates:
+            dem.set_plates({**dem.plates, **stage.plates})
+        if stage.friction_angle is not None:
+            dem.set_material(replace(dem.material, friction_angle=stage.friction_angle))
+        dem.damping = stage.damping
+        if stage.fluid:
+            self._wet()
+        elif self.coupling is not None:
+            self.coupling = None
+            dem.apply(np.zeros((len(dem), 3)))
+        if stage.permeameter:
+            self._measure_permeability(k, "before")
+        if dem.steps == 0:
+            self._record(k, math.nan, row=True, ended=False)
+
+    def _wet(self) -> None:
+        """Bring the fluid, or change its walls."""
+        dem, fluid, options = self.dem, self.scene.fluid, self.scene.coupling
+        assert fluid is not None  # the scene has seen to it
+        walls = self._walls.at(dem.time)
+        if self.coupling is not None:
+            self.coupling.set_walls(walls)
+            return
+        # Pressures are piezometric: the hydrostatic part of the fluid's force is that on the volume of a grain.
+        volumes = 4.0 / 3.0 * np.pi * dem.radii**3
+        dem.apply(-fluid.density * volumes[:, None] * dem.gravity)
+        self.coupling = Coupling(dem, walls, fluid, options.conductance, **options.given)
+
+    def _follow(self, k: int) -> None:
+        """Take a stage's steps to its end."""
+        stage, dem, span = self.scene.stages[k], self.dem, self.record.spans[k]
+        last = span.begin_step + self._most_steps(stage)
+        rows = _Times(self._every(stage), dem.step, span.begin_step)
+        strides = _Times(_STRIDE * dem.step, dem.step, span.begin_step)
+        ended = False
+        while not ended:
+            times = (rows, strides, self._profile_times, self._frame_times)
+            target = int(min(last, *(each.next(dem.steps) for each in times)))
+            self._advance(target - dem.steps - 1)
+            before = measurements.momentum(dem)
+            self._advance(1)
+            residual = measurements.momentum_residual(dem, self.coupling, before)
+            ended = self._ended(stage, last, look=strides.due(target, ended=False))
+            self._record(k, residual, row=rows.due(target, ended), ended=ended)
+            self._show(k, residual)
+            if ended:
+                span.end = dem.time
+                if stage.permeameter:
+                    self._measure_permeability(k, "after")
+            if ended or self.asked_to_stop or self._saving_due:
+                self._save(ended)
+            if self.asked_to_stop:
+                raise KeyboardInterrupt
+
+    def _most_steps(self, stage: Stage) -> int:
+        duration = stage.end.limit if isinstance(stage.end, Rest) else stage.end
+        return _MOST if duration is None else max(1, math.ceil(duration / self.dem.step - 1e-9))
+
+    def _every(self, stage: Stage) -> float:
+        """Time between rows [s]."""
+        default = ROW_STEPS * self.dem.step if isinstance(stage.end, Rest) else stage.end / ROWS
+        return stage.every or self.scene.output.every or default
+
+    def _advance(self, steps: int) -> None:
+        coupling = self.coupling
+        if coupling is None:
+            self.dem.run(steps)
+        elif self._walls.steady:
+            coupling.run(steps)
+        else:
+            for _ in range(steps):
+                # Pressures act over a step: they are those of its middle.
+                coupling.set_walls(self._walls.at(self.dem.time + 0.5 * self.dem.step))
+                coupling.run(1)
+
+    def _ended(self, stage: Stage, last: int, look: bool) -> bool:
+        """Whether a stage is at its end; `look` whether grains are at rest.
+
+        Raises
+        ------
+        ComputationError
+            If they should be, and are not.
+        """
+        rest = stage.end
+        if not isinstance(rest, Rest):
+            return self.dem.steps >= last
+        if not (look or self.dem.steps >= last):
+            return False
+        unbalanced = measurements.unbalanced(self.dem, self.coupling)
+        stresses = measurements.total_stresses(self.dem, self.coupling)
+        targets = {name: plate.stress for name, plate in self.dem.plates.items() if plate.stress is not None}
+        short = [name for name, stress in targets.items() if abs(stresses[name] - stress) > rest.stress * stress]
+        if unbalanced <= rest.unbalanced and not short:
+            return True
+        if self.dem.steps >= last:
+            wall = ""
+            if short:
+                name = short[0]
+                wall = f"wall {name} presses with {stresses[name]:.4g} Pa, not {targets[name]:.4g}; "
+            raise ComputationError(
+                f"stage '{stage.name}' does not come to rest in {last - self.record.spans[-1].begin_step} steps: {wall}"
+                f"the unbalanced force is {unbalanced:.2g} of the mean contact force, {rest.unbalanced:.2g} asked. "
+                "Damping, or friction, is what brings dry grains to rest; a plate needs grains to press on, and speed"
+            )
+        return False
+
+    # ---- records ------------------------------------------------------------------------------------------------
+
+    def _record(self, k: int, residual: float, *, row: bool, ended: bool) -> None:
+        dem, coupling = self.dem, self.coupling
+        if row:
+            numbers = measurements.grain_row(dem, coupling, np.array(self.record.box), residual)
+            if coupling is not None:
+                numbers |= measurements.fluid_row(coupling, dem)
+            self._series.add(numbers | {"stage": k + 1})
+        if self._profiles is not None and self._profile_times.due(dem.steps, ended):
+            for layer in measurements.profile_rows(dem, coupling, self._axis, self.scene.output.layers):
+                self._profiles.add(layer | {"stage": k + 1})
+        if self._frames is not None and self._frame_times.due(dem.steps, ended):
+            self._frames.write(dem, coupling)
+
+    def _measure_permeability(self, k: int, when: str) -> None:
+        found = measurements.permeability(
+            self.dem, self._axis, self._walls.at(self.dem.time).slip, self.scene.coupling.conductance
+        )
+        self.record.permeability.append(
+            {
+                "stage": self.scene.stages[k].name, "when": when, "time": self.dem.time,
+                "axis": self.scene.output.axis, "porosity": self.dem.porosity, "permeability": found,
+            }
+        )  # fmt: skip
+
+    def _show(self, k: int, residual: float) -> None:
+        if not self.progress.draws:
+            return
+        stage, energies = self.scene.stages[k], self.dem.energies
+        self.progress.show(
+            RunState(
+                time=self.dem.time,
+                total=self.record.spans[k].begin + stage.end if not isinstance(stage.end, Rest) else None,
+                kinetic=energies.kinetic / energies.stored if energies.stored else 0.0,
+                imbalance=self.coupling.power.imbalance if self.coupling else residual,
+                unbalanced=measurements.unbalanced(self.dem, self.coupling),
+            )
+        )
+
+    # ---- checkpoints --------------------------------------------------------------------------------------------
+
+    @property
+    def _saving_due(self) -> bool:
+        saving, (step, moment) = self.scene.saving, self._saved
+        if saving.steps is not None:
+            return self.dem.steps - step >= saving.steps
+        return saving.seconds is not None and time.perf_counter() - moment >= saving.seconds
+
+    def _save(self, ended: bool) -> None:
+        self.record.seconds = time.perf_counter() - self._clock
+        sizes = {SERIES: self._series.size}
+        if self._profiles is not None:
+            sizes[PROFILES] = self._profiles.size
+        frames = self._frames.pores if self._frames is not None else {}
+        self.record.save(self.directory, self.dem, self.coupling, ended, sizes, frames)
+        self._saved = self.dem.steps, time.perf_counter()
+
+    def stop(self, status: str) -> str:
+        """Note how the run ended, and tell what there is; what came after the last checkpoint is not noted."""
+        record = read_record(self.directory)
+        record.status = status
+        record.write(self.directory)
+        if record.checkpoint is None:
+            return f"The series so far is in {self.directory}; there is no checkpoint yet to go on from"
+        return (
+            f"The series so far and the state at {record.checkpoint.time:.6g} s are in {self.directory}; go on from "
+            f"there with: porefv simulate {self.scene.path or 'SCENE.toml'} --resume"
+        )
+
+    def close(self) -> None:
+        self._series.close()
+        if self._profiles is not None:
+            self._profiles.close()

@@ -1,0 +1,266 @@
+"""Conjugate gradients on a network, in fused kernels, judged by the flow that the nodes fail to conserve.
+
+`conjugate_gradients` finds pressures in double precision. `refined` finds them as the sum of two doubles each: stiff
+throats then pass flows that differences of single doubles could not tell from nothing.
+
+Sums run over blocks of fixed size, so that results do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from porefv.solvers.network import Network
+from porefv.system.kernels import njit, prange
+from porefv.system.threads import threads_for
+
+_BLOCK = 16384
+# By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
+_REACH = 1e-10
+_MAX_ITERATIONS = 500
+# Corrections that may fail to halve the imbalance before it is given up: rounding of the first ones, in throats
+# 10¹⁶ times as conductive as others, makes flows larger than all there are, which the next ones take away.
+_PATIENCE = 3
+_EPSILON = float(np.finfo(float).eps)
+# Iterations between two looks at what the tolerance is measured against.
+_LOOK_EVERY = 4
+
+
+class Preconditioner(Protocol):
+    """What nearly inverts a network."""
+
+    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+        """z = M⁻¹ r; returns r·z. `y`, (n,), is room to work in."""
+        ...
+
+
+def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+    """Σ|b - A x|, the flow through the network, and the rounding of the first.
+
+    The flow is half of all that enters or leaves; Σ ε d|x| is what rounding x to double precision alone may lose.
+    """
+    lost = float(np.abs(network.residual(rhs, x)).sum())
+    return lost, *_measures(network, rhs, x)
+
+
+def _measures(network, rhs, x):
+    flow, size = _flow_and_size(network.leaks, network.diagonal, rhs, x)
+    return 0.5 * flow, _EPSILON * size
+
+
+def conjugate_gradients(
+    network: Network,
+    rhs: np.ndarray,
+    preconditioner: Preconditioner,
+    tolerance: float,
+    guess: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """Iterate until Σ|b - A x| is below `tolerance` times the flow, or rounding allows no better.
+
+    Returns
+    -------
+    x (n,), number of iterations
+    """
+    with threads_for(len(network)):
+        return _iterate(network, rhs, preconditioner, tolerance, guess)
+
+
+def _iterate(a, rhs, preconditioner, tolerance, guess):
+    x = np.zeros(len(a)) if guess is None else guess.copy()
+
+    def enough():
+        flow, floor = _measures(a, rhs, x)
+        return 0.5 * max(tolerance * flow, floor)
+
+    iterations = 0
+    before = np.inf
+    while True:
+        # (Re)start from the true residual: the recurrence drifts from it by rounding.
+        r = a.residual(rhs, x)
+        lost = float(np.abs(r).sum())
+        flow, floor = _measures(a, rhs, x)
+        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= _MAX_ITERATIONS:
+            return x, iterations
+        before = lost
+        iterations += _descend(a, x, r, preconditioner, 0.0, enough, _MAX_ITERATIONS - iterations)
+
+
+def _descend(a, x, r, preconditioner, least, enough, limit):
+    """Iterate on x, whose residual is r, until Σ|r| is below `least` or what is `enough` now; returns how often."""
+    z, ap, room = np.empty((3, len(a)))
+    rz = preconditioner.apply(r, z, room)
+    p = z.copy()
+    target = least
+    iterations = 0
+    while iterations < limit:
+        iterations += 1
+        power = _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
+        if not power > 0.0:  # what is left is no number any more, or the factor is spoilt
+            break
+        lost = _advance(x, r, p, ap, rz / power)
+        if iterations % _LOOK_EVERY == 0:
+            target = max(least, enough())
+        if lost <= target:
+            break
+        new = preconditioner.apply(r, z, room)
+        if not new > 0.0:
+            break
+        _redirect(p, z, new / rz)
+        rz = new
+    return iterations
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Pressures as sums of two doubles, and how exact they are.
+
+    Attributes
+    ----------
+    x, rest : (n,) arrays
+        Pressures, and what rounding has left of them [Pa].
+    iterations : int
+    lost, flow : float
+        Σ|b - A x|, and half of all that enters or leaves [m³/s].
+    error : float
+        Estimate of the largest error of a pressure: what A⁻¹ makes of |b - A x| [Pa].
+    """
+
+    x: np.ndarray
+    rest: np.ndarray
+    iterations: int
+    lost: float
+    flow: float
+    error: float
+
+
+def refined(
+    network: Network,
+    held: np.ndarray,
+    sources: np.ndarray,
+    preconditioner: Preconditioner,
+    tolerance: float,
+    accuracy: float,
+) -> Refined:
+    """Iterate until Σ|b - A x| is below `tolerance` times the flow and the error of pressures below `accuracy`.
+
+    Parameters
+    ----------
+    network : Network
+    held : (n,) array
+        Pressure that each node's leaks lead to [Pa].
+    sources : (n,) array
+        Volume injected into each node per unit time [m³/s].
+    preconditioner : ApproximateCholesky or DirectFactor
+    tolerance : float
+    accuracy : float
+        [Pa]
+
+    Returns
+    -------
+    Refined
+        Its best, whether or not it meets both.
+    """
+    with threads_for(len(network)):
+        x, rest = np.zeros((2, len(network)))
+        total, rounds, halved, best = 0, 0, 0, None
+        while True:
+            r = network.split_residual(held, sources, x, rest)
+            flow = 0.5 * float(np.abs(network.leaks * ((held - x) - rest)).sum() + np.abs(sources).sum())
+            lost = float(np.abs(r).sum())
+            error = np.inf
+            if lost <= tolerance * flow:
+                error = _largest_error(preconditioner, r)
+            rounds += 1
+            if best is None or lost < 0.5 * best.lost:
+                halved = rounds
+            if best is None or lost < best.lost:
+                best = Refined(x, rest, total, lost, flow, error)
+            stalled = rounds - halved >= _PATIENCE
+            if (lost <= tolerance * flow and error <= accuracy) or stalled or total >= _MAX_ITERATIONS:
+                break
+            hasty = error == np.inf and halved == rounds  # else as far as one residual reaches
+            correction, iterations = _correction(
+                network, held, sources, x, rest, r, preconditioner, tolerance if hasty else 0.0
+            )
+            total += iterations
+            rest = rest + correction
+            larger = x + rest  # the sum of both, and exactly what rounding it leaves
+            part = larger - x
+            x, rest = larger, (x - (larger - part)) + (rest - part)
+        if best.error == np.inf:
+            r = network.split_residual(held, sources, best.x, best.rest)
+            best = replace(best, error=_largest_error(preconditioner, r))
+        return replace(best, iterations=total)
+
+
+def _largest_error(preconditioner: Preconditioner, r: np.ndarray) -> float:
+    z, room = np.empty((2, len(r)))
+    preconditioner.apply(np.abs(r), z, room)
+    return float(np.abs(z).max(initial=0.0))
+
+
+def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
+    """What to add to the pressures, from their residual r: to the tolerance, or as far as one residual reaches."""
+    d = np.zeros(len(a))
+
+    def enough():
+        flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
+        return 0.5 * tolerance * flow
+
+    least = _REACH * float(np.abs(r).sum())
+    return d, _descend(a, d, r.copy(), preconditioner, least, enough, _MAX_ITERATIONS)
+
+
+@njit(cache=True, parallel=True)
+def _flow_and_size(leaks, diagonal, rhs, x):
+    """Σ|e x - b| and Σ d|x|."""
+    n = x.shape[0]
+    flow = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    size = np.zeros(flow.shape[0])
+    for block in prange(flow.shape[0]):
+        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
+            flow[block] += abs(leaks[i] * x[i] - rhs[i])
+            size[block] += diagonal[i] * abs(x[i])
+    return flow.sum(), size.sum()
+
+
+@njit(cache=True, parallel=True)
+def _multiply(starts, columns, links, leaks, p, ap):
+    """ap = A p; returns p·ap."""
+    n = p.shape[0]
+    parts = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    for block in prange(parts.shape[0]):
+        total = 0.0
+        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
+            s = leaks[i] * p[i]
+            for k in range(starts[i], starts[i + 1]):
+                s += links[k] * (p[i] - p[columns[k]])
+            ap[i] = s
+            total += s * p[i]
+        parts[block] = total
+    return parts.sum()
+
+
+@njit(cache=True, parallel=True)
+def _advance(x, r, p, ap, alpha):
+    """x += α p, r -= α ap; returns Σ|r|."""
+    n = p.shape[0]
+    lost = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    for block in prange(lost.shape[0]):
+        total = 0.0
+        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
+            x[i] += alpha * p[i]
+            r[i] -= alpha * ap[i]
+            total += abs(r[i])
+        lost[block] = total
+    return lost.sum()
+
+
+@njit(cache=True, parallel=True)
+def _redirect(p, z, beta):
+    """p = z + β p."""
+    for i in prange(p.shape[0]):
+        p[i] = z[i] + beta * p[i]

@@ -1,0 +1,134 @@
+"""Network: the pressure equation's matrix as what it is, links between free pores and leaks to held ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.system.kernels import njit, prange
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Symmetric M-matrix A = Σ links + leaks: (A x)_i = e_i x_i + Σ_j w_ij (x_i - x_j).
+
+    Kept as non-negative links and leaks, from which sums of any scale are formed without cancellation.
+
+    Attributes
+    ----------
+    starts : (n + 1,) int64 array
+        Row i holds the entries starts[i] ... starts[i + 1].
+    columns : int32 array
+        Node at the other end of each link; every link stands in both its rows.
+    links : array
+        Weight w_ij > 0 of each entry [m³/(Pa s)].
+    leaks : (n,) array
+        Weight e_i >= 0 of each node's links to nodes outside [m³/(Pa s)].
+    diagonal : (n,) array
+        e_i + Σ_j w_ij.
+    """
+
+    starts: np.ndarray
+    columns: np.ndarray
+    links: np.ndarray
+    leaks: np.ndarray
+    diagonal: np.ndarray
+
+    @classmethod
+    def from_links(
+        cls, pairs: np.ndarray, weights: np.ndarray, leaks: np.ndarray, number: np.ndarray | None = None
+    ) -> Network:
+        """From links (t, 2), their weights (t,) and the leaks (n,) of the nodes; parallel links stay apart.
+
+        Links join nodes, or things whose node is `number`; those with a negative number at one end are left out, as
+        are those without weight.
+        """
+        if number is None:
+            number = np.arange(len(leaks), dtype=np.int32)
+        starts = np.zeros(len(leaks) + 1, np.int64)
+        _count(pairs, weights, number, starts)
+        np.cumsum(starts, out=starts)
+        columns = np.empty(starts[-1], np.int32)
+        links = np.empty(starts[-1])
+        diagonal = leaks.copy()
+        _fill(pairs, weights, number, starts[:-1].copy(), columns, links, diagonal)
+        return cls(starts, columns, links, leaks, diagonal)
+
+    def __len__(self) -> int:
+        return len(self.leaks)
+
+    def residual(self, rhs: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """b - A x, from differences of x: the imbalance of each node."""
+        out = np.empty(len(self))
+        residual(self.starts, self.columns, self.links, self.leaks, rhs, x, out)
+        return out
+
+    def split_residual(self, held: np.ndarray, sources: np.ndarray, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """b - A (x + rest), b = leaks held + sources: from differences of both parts of the pressures."""
+        out = np.empty(len(self))
+        split_residual(self.starts, self.columns, self.links, self.leaks, held, sources, x, rest, out)
+        return out
+
+    def to_matrix(self) -> sparse.csr_array:
+        """A as a scipy matrix."""
+        from scipy import sparse
+
+        n = len(self)
+        off = sparse.csr_array((-self.links, self.columns.copy(), self.starts.copy()), shape=(n, n))
+        off.sum_duplicates()
+        return (off + sparse.diags_array(self.diagonal)).tocsr()
+
+
+@njit(cache=True)
+def _count(pairs, weights, number, starts):
+    """Add the number of node i's links to starts[i + 1]."""
+    for t in range(pairs.shape[0]):
+        a = number[pairs[t, 0]]
+        b = number[pairs[t, 1]]
+        if a >= 0 and b >= 0 and weights[t] > 0.0:
+            starts[a + 1] += 1
+            starts[b + 1] += 1
+
+
+@njit(cache=True)
+def _fill(pairs, weights, number, place, columns, links, diagonal):
+    """Store every link in both its rows, from `place` on, and add it to the diagonal."""
+    for t in range(pairs.shape[0]):
+        a = number[pairs[t, 0]]
+        b = number[pairs[t, 1]]
+        if a < 0 or b < 0 or weights[t] <= 0.0:
+            continue
+        columns[place[a]] = b
+        columns[place[b]] = a
+        links[place[a]] = weights[t]
+        links[place[b]] = weights[t]
+        diagonal[a] += weights[t]
+        diagonal[b] += weights[t]
+        place[a] += 1
+        place[b] += 1
+
+
+@njit(cache=True, parallel=True)
+def residual(starts, columns, links, leaks, rhs, x, out):
+    """out = b - A x."""
+    for i in prange(leaks.shape[0]):
+        s = rhs[i] - leaks[i] * x[i]
+        for k in range(starts[i], starts[i + 1]):
+            s -= links[k] * (x[i] - x[columns[k]])
+        out[i] = s
+
+
+@njit(cache=True, parallel=True)
+def split_residual(starts, columns, links, leaks, held, sources, x, rest, out):
+    """out = leaks held + sources - A (x + rest)."""
+    for i in prange(leaks.shape[0]):
+        s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            s -= links[k] * ((x[i] - x[j]) + (rest[i] - rest[j]))
+        out[i] = s

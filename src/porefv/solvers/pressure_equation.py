@@ -1,0 +1,171 @@
+"""The pressure equation: Σ_j K_ij (p_i - p_j) = source, on the network of pores and throats (C12 eq. 20)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from porefv.errors import ComputationError
+from porefv.solvers.network import Network
+from porefv.solvers.solver import TOLERANCE, SolverReport, solve_split
+from porefv.system.kernels import njit
+from porefv.system.union_find import join
+
+
+@dataclass(frozen=True)
+class NetworkSolution:
+    """Pressures of all pores.
+
+    Attributes
+    ----------
+    pressure : (n_pores,) array
+        Pressure of each pore [Pa].
+    isolated : (n_pores,) bool array
+        Pores from which no flow reaches a pore of imposed pressure.
+    report : SolverReport
+    rest : (n_pores,) array
+        What rounding has left of each pressure: differences of `pressure` plus those of `rest` drive the fluxes [Pa].
+    """
+
+    pressure: np.ndarray
+    isolated: np.ndarray
+    report: SolverReport
+    rest: np.ndarray
+
+
+def solve_network(
+    pairs: np.ndarray,
+    conductances: np.ndarray,
+    fixed: np.ndarray,
+    *,
+    links: Callable[[], np.ndarray] | None = None,
+    sources: np.ndarray | None = None,
+    solver: str = "auto",
+    tolerance: float = TOLERANCE,
+) -> NetworkSolution:
+    """Solve for the pressures of the pores that are not fixed.
+
+    Parameters
+    ----------
+    pairs : (t, 2) int array
+        Pores joined by each throat.
+    conductances : (t,) array
+        K of each throat, not negative [m³/(Pa s)].
+    fixed : (n_pores,) array
+        Imposed pressures, NaN where free [Pa].
+    links : function, optional
+        Returns positive weights (t,), by which pores without any flowing path to an imposed pressure take theirs from
+        their neighbours (equal weights by default); called only if there are such. Nothing flows there: the rule
+        only keeps their pressure, which the flow leaves open, within that of their surroundings.
+    sources : (n_pores,) array, optional
+        Volume injected into each free pore per unit time [m³/s].
+    solver, tolerance
+        See `porefv.solvers.solver.Solver`.
+
+    Raises
+    ------
+    ComputationError
+        If no pore is fixed, an isolated pore has a source, or the solver fails.
+    """
+    n = len(fixed)
+    free = np.isnan(fixed)
+    if free.all():
+        raise ComputationError("no pore has an imposed pressure: pressures are defined only up to a constant")
+    sources = np.zeros(n) if sources is None else sources
+    isolated = ~reached(pairs, conductances, ~free)
+    if np.any(sources[isolated] != 0.0):
+        pore = int(np.flatnonzero(isolated & (sources != 0.0))[0])
+        raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
+
+    pressure = np.where(free, 0.0, fixed)
+    rest = np.zeros(n)
+    report = _solve_free(pairs, conductances, pressure, rest, free & ~isolated, sources, solver, tolerance)
+    if isolated.any():
+        cut_off = ~reached(pairs, np.ones(len(pairs)), ~free)
+        if cut_off.any():
+            raise ComputationError(
+                f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
+                "that lead to an imposed pressure: their pressure is not defined"
+            )
+        weights = np.ones(len(pairs)) if links is None else links()
+        touching = isolated[pairs].any(axis=1)
+        _solve_free(pairs[touching], weights[touching], pressure, rest, isolated, np.zeros(n), "auto", tolerance)
+    return NetworkSolution(pressure, isolated, report, rest)
+
+
+@njit(cache=True)
+def reached(pairs, weights, sources):
+    """(n,) bool: nodes that links of positive weight join to a source."""
+    n = sources.shape[0]
+    parent = np.arange(n)
+    for t in range(pairs.shape[0]):
+        if weights[t] > 0.0:
+            join(parent, pairs[t, 0], pairs[t, 1])
+    found = np.zeros(n, np.bool_)
+    for i in range(n):  # a root comes before all that hang on it
+        parent[i] = parent[parent[i]]
+        if sources[i]:
+            found[parent[i]] = True
+    for i in range(n):
+        found[i] = found[parent[i]]
+    return found
+
+
+def _solve_free(pairs, conductances, pressure, rest, free, sources, solver, tolerance):
+    """Solve for the pressures of the free pores, in place; all others are held."""
+    network, rhs = free_network(pairs, conductances, pressure, free, sources)
+    held = _held_beside(pairs, conductances, pressure, free, (rhs - sources[free]), network.leaks)
+    solution = solve_split(network, held, sources[free], solver, tolerance)
+    pressure[free] = solution.pressure
+    rest[free] = solution.rest
+    return solution.report
+
+
+def _held_beside(pairs, conductances, pressure, free, inflow, leaks):
+    """(number of free pores,): mean pressure of the held pores beside each free one, exact where they are equal."""
+    number = np.cumsum(free) - 1
+    lowest, highest = np.full(len(leaks), np.inf), np.full(len(leaks), -np.inf)
+    for a, b in (pairs.T, pairs.T[::-1]):
+        beside = free[a] & ~free[b] & (conductances > 0.0)
+        np.minimum.at(lowest, number[a[beside]], pressure[b[beside]])
+        np.maximum.at(highest, number[a[beside]], pressure[b[beside]])
+    mean = np.divide(inflow, leaks, out=np.zeros(len(leaks)), where=leaks > 0.0)
+    return np.where(lowest == highest, lowest, mean)
+
+
+def free_network(
+    pairs: np.ndarray, conductances: np.ndarray, pressure: np.ndarray, free: np.ndarray, sources: np.ndarray
+) -> tuple[Network, np.ndarray]:
+    """The network of the free pores, all others held at their pressure, and its right-hand side.
+
+    Parameters
+    ----------
+    pairs : (t, 2) int array
+    conductances : (t,) array
+    pressure, sources : (n_pores,) arrays
+    free : (n_pores,) bool array
+    """
+    number = np.cumsum(free, dtype=np.int32) - np.int32(1)
+    number[~free] = -1
+    rhs = sources[free]
+    leaks = np.zeros(len(rhs))
+    _leak(pairs, conductances, pressure, number, leaks, rhs)
+    return Network.from_links(pairs, conductances, leaks, number), rhs
+
+
+@njit(cache=True)
+def _leak(pairs, conductances, pressure, number, leaks, rhs):
+    """Add links from free to held pores to `leaks` and `rhs`."""
+    for t in range(pairs.shape[0]):
+        i = pairs[t, 0]
+        j = pairs[t, 1]
+        a = number[i]
+        b = number[j]
+        if a >= 0 and b < 0:
+            leaks[a] += conductances[t]
+            rhs[a] += conductances[t] * pressure[j]
+        elif b >= 0 and a < 0:
+            leaks[b] += conductances[t]
+            rhs[b] += conductances[t] * pressure[i]

@@ -1,0 +1,1 @@
+"""What the package needs of the machine and of Python, and knows nothing of physics."""

@@ -1,0 +1,105 @@
+"""How much memory the process may still take: the least of what machine, container and limits of the process leave."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from porefv.errors import ComputationError
+
+LOADED = 200 * 2**20  # B: Python, numpy, scipy, numba and the kernels
+
+# Limits of the process: the place in /proc/self/statm of what counts towards each, and what libraries and each thread
+# take of it besides memory that is used. They reserve addresses, a stack of 8 MiB and an arena of 64 MiB a thread:
+# 680 MiB at the peak of a flow with one thread, 1750 with sixteen, of which 240 are ever touched.
+_LIMITS = {"RLIMIT_AS": (0, 640 * 2**20, 72 * 2**20), "RLIMIT_DATA": (5, 64 * 2**20, 16 * 2**20)}
+
+
+def available(root: Path = Path("/")) -> int | None:
+    """Bytes this process may still take, or None where the system does not say.
+
+    The least of what the machine has, of what each control group around the process (a container, a batch job)
+    has left, and of what the process has left of its limits (ulimit -v, ulimit -d).
+
+    Parameters
+    ----------
+    root : Path
+        Where /proc and /sys are.
+    """
+    return min((*_machine(root), *_control_groups(root), *_process(root)), default=None)
+
+
+def _machine(root: Path) -> Iterator[int]:
+    try:
+        for line in (root / "proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                yield 1024 * int(line.split()[1])
+                return
+    except (OSError, ValueError):
+        pass
+    try:
+        yield os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        pass
+
+
+def _control_groups(root: Path) -> Iterator[int]:
+    """What each group that holds the process has left, the process's own first, version 2 or 1."""
+    try:
+        lines = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):
+        return
+    for line in lines:
+        if line.count(":") < 2:
+            continue
+        _, controllers, path = line.split(":", 2)
+        mount = root / "sys/fs/cgroup"
+        limit, usage, idle = "memory.max", "memory.current", "inactive_file"
+        if controllers:
+            if "memory" not in controllers.split(","):
+                continue
+            mount /= "memory"
+            limit, usage, idle = "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"
+        # Within a container the path may be the host's, and only the mount itself be there.
+        group = mount / path.lstrip("/")
+        for folder in (group, *group.parents):
+            try:
+                # "max" is no number: no limit.
+                left = int((folder / limit).read_text()) - int((folder / usage).read_text())
+                stat = dict(entry.split() for entry in (folder / "memory.stat").read_text().splitlines())
+                yield max(0, left + int(stat.get(idle, 0)))  # pages of files, dropped when room is short
+            except (OSError, ValueError):
+                pass
+            if folder == mount:
+                break
+
+
+def _process(root: Path) -> Iterator[int]:
+    try:
+        import resource
+
+        used = [int(pages) * resource.getpagesize() for pages in (root / "proc/self/statm").read_text().split()]
+        threads = len(os.sched_getaffinity(0))
+    except (ImportError, AttributeError, OSError, ValueError):  # not Linux
+        return
+    for name, (place, libraries, each) in _LIMITS.items():
+        limit, _ = resource.getrlimit(getattr(resource, name))
+        if limit != resource.RLIM_INFINITY:
+            yield max(0, limit - max(used[place], libraries + each * threads))
+
+
+def ensure_libraries() -> None:
+    """Raise a ComputationError if not even libraries can be loaded: some of them hang, or end the process."""
+    have = available()
+    if have is not None and have < LOADED:
+        raise ComputationError(
+            f"porefv itself needs {size_text(LOADED)} of memory, {size_text(have)} are free: "
+            "raise the limit of the process (ulimit -v, ulimit -d), of the container or of the job, or use a machine "
+            "with more"
+        )
+
+
+def size_text(size: int) -> str:
+    """A number of bytes as shown in an error: ``512 MiB``, ``1.5 GiB``."""
+    return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.1f} GiB"

@@ -1,0 +1,39 @@
+"""Checks of single numbers and of arrays of numbers; an error names the value and what is wanted."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import numpy as np
+
+from porefv.errors import ComputationError, InputError
+
+# Sizes of pressures, viscosities, densities and accelerations, such that no product of them leaves double precision.
+LEAST, MOST = 1e-60, 1e60
+
+
+def within_range(value: float) -> bool:
+    """Whether a positive number can be computed with."""
+    return LEAST <= value <= MOST
+
+
+def is_finite_number(value: object) -> bool:
+    """Whether a value is a number, not a truth value, that a double can hold."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) <= sys.float_info.max  # false for nan, and for integers that are no float
+
+
+def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
+    """InputError unless the value is a finite number for which that holds."""
+    if not (is_finite_number(value) and holds(value)):  # type: ignore[arg-type]
+        raise InputError(f"{name} must be {what}, not {value!r}")
+
+
+def ensure_finite(values: np.ndarray, what: str) -> np.ndarray:
+    """The values; a ComputationError if any of them is not finite."""
+    bad = np.count_nonzero(~np.isfinite(values))
+    if bad:
+        raise ComputationError(f"{bad} of {values.size} {what} are not finite numbers; nothing can be said of the flow")
+    return values

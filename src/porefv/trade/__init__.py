@@ -1,1 +1,0 @@
-"""Accuracy against time and memory, on a scene of the user's."""
