@@ -22,10 +22,18 @@ from time import process_time
 import numpy as np
 from voids import widest_pores, with_grain
 
-from porefv import Box, EffectiveRadius, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
-from porefv.conductance import ConductanceModel, SectionFriction
+from porefv.conductance.effective_radius import EffectiveRadius
+from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.conductance.model import ConductanceModel
+from porefv.conductance.section_friction.model import SectionFriction
+from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces
-from porefv.resolved import StokesReference
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+from porefv.resolved.reference import StokesReference
 
 DATA = Path(__file__).parent.parent / "data"
 MODELS = (EffectiveRadius(), HydraulicRadius(), SectionFriction())
@@ -549,7 +557,7 @@ def cost(out: Path | None) -> None:
     print(f"{len(throats)} throats, conductances:", end=" ")
     for model in MODELS:
         throats = PoreMesh(packing).throats
-        _ = mesh.facets.sectors
+        _ = throats.mesh.facets.sectors
         before = process_time()
         model.conductivity(throats, slip)
         print(f"{model.name} {process_time() - before:.2f} s", end="  ")

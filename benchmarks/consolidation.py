@@ -21,13 +21,22 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
-from porefv.conductance import AUTO, MODELS, ConductanceModel
-from porefv.coupling import Coupling
-from porefv.coupling.end_correction import permeameter
-from porefv.dem import DEM, Material, Plate, UniformSizes, checkpoint, grow
-from porefv.flow.pore_flow import throat_conductances
+from porefv.conductance.conductances import throat_conductances
+from porefv.conductance.model import ConductanceModel
+from porefv.conductance.registry import AUTO, MODELS
 from porefv.coupling.consolidation import terzaghi_pressure, terzaghi_settlement
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.end_correction import permeameter
+from porefv.dem import checkpoint
+from porefv.dem.dem import DEM
+from porefv.dem.generation import UniformSizes, grow
+from porefv.dem.material import Material, Plate
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
 
 SIDE, CONFINEMENT, VISCOSITY = 0.66, 5e3, 250.0
 MATERIAL = Material(young=15e6, stiffness_ratio=0.5, friction_angle=30.0, density=2600.0)

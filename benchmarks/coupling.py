@@ -24,9 +24,10 @@ import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
 import porefv.coupling.coupling as coupled
-from porefv import ComputationError, Fluid
-from porefv.coupling import Coupling
-from porefv.dem import Plate
+from porefv.coupling.coupling import Coupling
+from porefv.dem.material import Plate
+from porefv.errors import ComputationError
+from porefv.flow.fluid import Fluid
 
 YADE = """
 import json, time
@@ -119,7 +120,7 @@ def cost(grains: int, store: Path) -> None:
     total = sum(effort.seconds.values())
     print(", ".join(f"{part} {seconds / total:.0%}" for part, seconds in effort.seconds.items()))
     begin = time.process_time()
-    coupling._renew()
+    coupling.renew_mesh()
     coupling.run(1)
     print(f"  a new mesh, and its first step: {1e3 * (time.process_time() - begin):.0f} ms")
     rival = yade(coupling.grains, 0.1)

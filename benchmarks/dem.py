@@ -21,8 +21,10 @@ from pathlib import Path
 import numpy as np
 from scale import mirrored
 
-from porefv import ComputationError, Packing
-from porefv.dem import DEM, Material
+from porefv.dem.dem import DEM
+from porefv.dem.material import Material
+from porefv.errors import ComputationError
+from porefv.packing.packing import Packing
 
 PACKINGS = Path(__file__).resolve().parents[1] / "data" / "packings"
 SIZES = (2_000, 20_000, 160_000, 1_000_000)
@@ -104,7 +106,7 @@ def measure(grains: int) -> tuple[float, int, float]:
         dem.run(steps)
         best = min(best, (time.perf_counter() - begin) / steps)
     begin = time.perf_counter()
-    dem._list_pairs()
+    dem.list_pairs()
     return best, len(dem.contacts), (time.perf_counter() - begin) / grains
 
 

@@ -18,11 +18,18 @@ import numpy as np
 from scale import PACKINGS, TILES, mirrored
 from voids import widest_pores, with_grain
 
-from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, SectionFriction, Wall, Walls
-from porefv.solvers.approximate_cholesky import ApproximateCholesky
-from porefv.conductance import AUTO, MODELS
-from porefv.solvers.conjugate_gradients import refined
+from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.conductance.registry import AUTO, MODELS
+from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import PorefvError
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Wall, Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.conjugate_gradients import refined
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network
 

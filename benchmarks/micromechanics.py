@@ -16,11 +16,14 @@ from pathlib import Path
 import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, permeability, sample
 
-from porefv import Fluid, PoreMesh
-from porefv.conductance import AUTO
-from porefv.coupling import Coupling
-from porefv.dem import DEM, Plate
-from porefv.coupling.consolidation import grain_strains, grain_stresses, layer_means, terzaghi_pressure
+from porefv.conductance.registry import AUTO
+from porefv.coupling.consolidation import terzaghi_pressure
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.micromechanics import grain_strains, grain_stresses, layer_means
+from porefv.dem.dem import DEM
+from porefv.dem.material import Plate
+from porefv.flow.fluid import Fluid
+from porefv.mesh.pore_mesh import PoreMesh
 
 Z = 2
 STEPS = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])  # of the dry sample's load

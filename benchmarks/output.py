@@ -12,7 +12,11 @@ from pathlib import Path
 
 from scale import mirrored
 
-from porefv import Fluid, HydraulicRadius, PoreFlow, Walls, results
+from porefv import results
+from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
 
 
 def main() -> None:

@@ -23,8 +23,13 @@ from pathlib import Path
 import numpy as np
 from yade_flow import run_yade
 
-from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Walls
-from porefv.conductance import conductance_model
+from porefv.conductance.registry import conductance_model
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
 
 PACKINGS = Path(__file__).resolve().parents[1] / "data" / "packings"
 REPEATS = {2_000: 5, 20_000: 5, 160_000: 2, 1_000_000: 1}

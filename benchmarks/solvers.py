@@ -14,7 +14,10 @@ import time
 import numpy as np
 from scale import TILES, mirrored
 
-from porefv import ComputationError, Fluid, PoreFlow, Walls
+from porefv.errors import ComputationError
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
 from porefv.solvers.conjugate_gradients import imbalance
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network, reached

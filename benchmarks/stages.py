@@ -21,8 +21,8 @@ from statistics import median
 
 from yade_flow import run_yade
 
+from porefv.scenes.flow_scene import FlowScene
 from porefv.system.progress import Progress
-from porefv.scenes.flow_scene import Scene
 
 SCENES = Path(__file__).resolve().parents[1] / "data" / "scenes"
 STEP = ("triangulation", "throats", "pressure", "forces")
@@ -36,10 +36,10 @@ def main() -> None:
     options = parser.parse_args()
     yade = None if options.no_yade else shutil.which("yade")
 
-    stages(Scene.read(options.scenes[0]))  # compiles, loads
+    stages(FlowScene.read(options.scenes[0]))  # compiles, loads
     columns = {}
     for path in options.scenes:
-        scene = Scene.read(path)
+        scene = FlowScene.read(path)
         runs = [stages(scene) for _ in range(options.repeat)]
         rows = {name: median(run[name] for run in runs) for name in runs[0]}
         rows["all stages"] = median(sum(run.values()) for run in runs)
@@ -53,7 +53,7 @@ def main() -> None:
     report(columns)
 
 
-def stages(scene: Scene) -> dict[str, float]:
+def stages(scene: FlowScene) -> dict[str, float]:
     """Seconds of each stage, reading and writing included."""
     progress = Progress(quiet=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -62,7 +62,7 @@ def stages(scene: Scene) -> dict[str, float]:
     return progress.seconds
 
 
-def command(scene: Scene) -> float:
+def command(scene: FlowScene) -> float:
     """Seconds of the command line, from its start to its end."""
     assert scene.path is not None
     with tempfile.TemporaryDirectory() as folder:

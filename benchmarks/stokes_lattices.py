@@ -10,9 +10,9 @@ import time
 
 import numpy as np
 
-from porefv.system.progress import Progress
 from porefv.resolved.fluid_mesh import fluid_mesh
 from porefv.resolved.stokes import solve_stokes
+from porefv.system.progress import Progress
 
 # Solid fraction, drag over 6π μ a U.
 ZICK_HOMSY = {

@@ -17,10 +17,16 @@ from pathlib import Path
 import numpy as np
 from voids import widest_pores, with_grain
 
-from porefv import Box, Fluid, HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
-from porefv.dem import Material
+from porefv.conductance.hydraulic_radius import HydraulicRadius
 from porefv.dem.generation import UniformSizes, cloud, grow
-from porefv.resolved import Options, stokes_reference
+from porefv.dem.material import Material
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+from porefv.resolved.refinement import Options, stokes_reference
 
 DATA = Path(__file__).parent.parent / "data"
 UNIT = Box([0, 0, 0], [1, 1, 1])

@@ -5,8 +5,8 @@
 
 Recorded, on one thread: the permeability and the force on every sphere and wall of each packing of data/packings with
 every conductance model and both kinds of lateral wall; the state of a coupled run after 200 steps, for both coupling
-schemes; and the state of a DEM run after 1000 steps. Without `--relative`, arrays must be equal to the bit. With it, the
-largest difference of an array must be below that part of its largest value. Bits may differ between processors, and
+schemes; and the state of a DEM run after 1000 steps. Without `--relative`, arrays must be equal to the bit. With it,
+the largest difference of an array must be below that part of its largest value. Bits may differ between processors, and
 between versions of numba, NumPy and SciPy.
 """
 
@@ -19,12 +19,16 @@ from pathlib import Path
 
 os.environ["NUMBA_NUM_THREADS"] = "1"
 
-import numpy as np  # noqa: E402 - the number of threads is fixed before numba is loaded
+import numpy as np
 
-from porefv import Packing, PoreFlow, PoreMesh, Wall, Walls  # noqa: E402
-from porefv.conductance import MODELS  # noqa: E402
-from porefv.coupling import Coupling  # noqa: E402
-from porefv.dem import DEM, Material, Plate  # noqa: E402
+from porefv.conductance.registry import MODELS
+from porefv.coupling.coupling import Coupling
+from porefv.dem.dem import DEM
+from porefv.dem.material import Material, Plate
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Wall, Walls
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Packing
 
 PACKINGS = Path(__file__).resolve().parents[1] / "data" / "packings"
 FORCES = ("pressure", "viscous", "buoyancy", "wall_pressure", "wall_viscous", "wall_buoyancy")

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from porefv import Packing, PoreMesh
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Packing
 
 
 def widest_pores(packing: Packing, count: int) -> tuple[np.ndarray, np.ndarray]:

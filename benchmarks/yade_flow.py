@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from porefv import Packing
+from porefv.packing.packing import Packing
 
 # Read by Yade's own Python; the spheres stand in a file beside it.
 SCRIPT = """

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from porefv.conductance import HydraulicRadius
-from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.packing.packing import Box, Packing
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
 
 DATA = Path(__file__).parent.parent / "data"
 

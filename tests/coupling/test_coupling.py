@@ -7,11 +7,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Wall, Walls
-from porefv.conductance import MODELS, SectionFriction
-from porefv.coupling import Coupling, Exchange, checkpoint
-from porefv.dem import DEM, Material, Plate
+from porefv.conductance.registry import MODELS
+from porefv.conductance.section_friction.model import SectionFriction
+from porefv.coupling import checkpoint
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.exchange import Exchange
+from porefv.dem.dem import DEM
+from porefv.dem.material import Material, Plate
 from porefv.errors import InputError
-from porefv.flow.forces import acting_weights
+from porefv.flow.solid_pressure import solid_pressure_weights
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 SEALED = Walls.from_mapping({"lateral": {"slip": True}})
@@ -42,14 +46,16 @@ def sample(reference):
 # ---- the operator ----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=["facets", "leaning", "volumes"])
+@pytest.fixture(params=["facets", "facets of pore centres", "volumes"])
 def exchange(request, reference):
     mesh, slip = PoreMesh(reference("n54_s1")), np.array([True] * 4 + [False] * 2)
-    if request.param != "leaning":
+    if request.param != "facets of pore centres":
         return mesh, Exchange.of(mesh, request.param, slip)
     flow = PoreFlow(mesh, Walls(z_max=Wall(pressure=1.0), **dict.fromkeys(("x_min", "x_max"), Wall(slip=True))))
-    leaning = acting_weights(mesh, SectionFriction(), flow.conductances, slip, ~np.isnan(flow.imposed_pressures))
-    return mesh, Exchange.of(mesh, "facets", slip, shares="drag", leaning=leaning)
+    weights = solid_pressure_weights(
+        mesh, SectionFriction(), flow.conductances, slip, ~np.isnan(flow.imposed_pressures)
+    )
+    return mesh, Exchange.of(mesh, "facets", slip, split="drag", solid_pressure=weights)
 
 
 def test_rates_of_all_pores_add_up_to_that_of_the_box(exchange):
@@ -102,10 +108,9 @@ def test_facet_forces_are_those_of_a_steady_flow(reference, slip, model):
     walls = Walls.along("y", slip=slip)
     flow = PoreFlow(packing, walls, conductance=model())
     held = ~np.isnan(flow.imposed_pressures)
-    leaning = acting_weights(flow.mesh, flow.conductance, flow.conductances, walls.slip, held)
-    assert (leaning is not None) == (model is SectionFriction)
-    shares = getattr(model, "shares", "surface")
-    operator = Exchange.of(flow.mesh, "facets", walls.slip, shares=shares, leaning=leaning)
+    weights = solid_pressure_weights(flow.mesh, flow.conductance, flow.conductances, walls.slip, held)
+    assert (weights is not None) == (model is SectionFriction)
+    operator = Exchange.of(flow.mesh, "facets", walls.slip, split=model.force_split, solid_pressure=weights)
     grains, _ = operator.forces(flow.cell_pressure, len(packing))
     assert_allclose(grains, flow.forces.pressure + flow.forces.viscous, atol=1e-13)
 
@@ -174,8 +179,8 @@ def test_momentum_and_volume_and_power_balance_at_each_step(sample):
     coupling = Coupling(dem, DRAINED, Fluid(viscosity=100.0), tolerance=1e-11)
     for _ in range(20):
         momentum = (dem.masses[:, None] * dem.velocities).sum(axis=0)
-        predicted = np.array(dem.predict()[0])
-        contacts = ((predicted - dem._state[:, 4:7]) / (dem.step * dem._inverse_mass[:, None])).sum(axis=0)
+        predicted, _, mobilities, _ = dem.predict()
+        contacts = ((predicted[dem.rows] - dem.velocities) / mobilities[dem.rows, None]).sum(axis=0)
         coupling.run(1)
         gained = (dem.masses[:, None] * dem.velocities).sum(axis=0) - momentum
         fluid = coupling.fluid_forces
@@ -253,10 +258,12 @@ def test_the_drag_number_is_the_limit_of_the_explicit_step(sample):
     # The largest eigenvalue of D Eᵀ G⁻¹ E against that of the dense matrix.
     dem = sample(6e3)
     coupling = Coupling(dem, DRAINED, Fluid(viscosity=1e-3), scheme="semi-implicit", end_correction=False)
-    pores = coupling._pores
+    pores = coupling.equation
     free = np.count_nonzero(pores.free)
     forces = np.stack([pores.forces(unit)[:-6].ravel() for unit in np.eye(free)], axis=1)
-    root = np.sqrt(np.repeat(dem.step * dem._inverse_mass, 3))[:, None]
+    mobilities = np.empty(len(dem))
+    mobilities[dem.rows] = dem.step / dem.masses
+    root = np.sqrt(np.repeat(mobilities, 3))[:, None]
     drag = (root * forces) @ np.linalg.solve(pores.network.to_matrix().toarray(), (root * forces).T)
     assert_allclose(coupling.drag_number, np.linalg.eigvalsh(drag)[-1], rtol=0.02)
 
@@ -270,7 +277,7 @@ def test_pressures_go_on_when_the_mesh_is_made_anew(sample):
     coupling.run(200)
     before, meshes = coupling.cell_pressure.copy(), coupling.effort.meshes
     volumes = coupling.mesh.cell_volumes
-    coupling._renew()
+    coupling.renew_mesh()
     coupling.run(1)
     assert coupling.effort.meshes == meshes + 1
     mean = np.average(before, weights=volumes)

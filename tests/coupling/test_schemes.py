@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
 from porefv import Fluid, Walls
-from porefv.coupling import Coupling
-from porefv.dem import DEM, Material
+from porefv.coupling.coupling import Coupling
+from porefv.dem.dem import DEM
+from porefv.dem.material import Material
 from porefv.dem.protocol import GrainModel
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
@@ -19,7 +20,7 @@ class LinearSkeleton:
     def __init__(self, packing, step):
         dem = DEM(packing, Material(friction_angle=0.0))
         self.start, self.radii, self.box, self.masses = dem.positions, dem.radii, dem.box, dem.masses
-        self.step, self.slots, self.wall_velocities = step, np.arange(len(dem)), np.zeros((6, 3))
+        self.step, self.rows, self.wall_velocities = step, np.arange(len(dem)), np.zeros((6, 3))
         self.stiffness = np.zeros((3 * len(dem), 3 * len(dem)))
         contacts = dem.contacts
         for (i, j), normal in zip(contacts.grains, contacts.normals, strict=True):
@@ -59,7 +60,7 @@ def skeleton(reference):
 
 def exact(model, coupling, time):
     """Displacements at a time: M u'' + Eᵀ G⁻¹ E u' + K u = 0."""
-    pores = coupling._pores
+    pores = coupling.equation
     forces = np.stack([pores.forces(unit)[:-6].ravel() for unit in np.eye(len(pores.network))], axis=1)
     drag = forces @ np.linalg.solve(pores.network.to_matrix().toarray(), forces.T)
     inverse = np.repeat(1.0 / model.masses, 3)[:, None]
@@ -104,7 +105,7 @@ def test_a_semi_implicit_step_beyond_its_limit_runs_away(skeleton, monkeypatch):
     # What is refused deserves it: a little above a drag number of 2 velocities grow, a little below they do not.
     import porefv.coupling.coupling as coupled
 
-    monkeypatch.setattr(coupled, "_UNSTABLE", np.inf)
+    monkeypatch.setattr(coupled, "UNSTABLE", np.inf)
     grown = {}
     for number in (1.7, 2.3):
         probe = Coupling(skeleton(1e-6), DRAINED, Fluid(viscosity=1.0), scheme="semi-implicit")

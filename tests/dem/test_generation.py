@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from porefv.dem import DEM, Material, Plate
+from porefv.dem.dem import DEM
 from porefv.dem.generation import Grading, UniformSizes, cloud, grow, mean_stress, settle
+from porefv.dem.material import Material, Plate
 from porefv.errors import ComputationError, InputError
-from porefv.packing.packing import WALLS, Box
+from porefv.packing.box import WALLS, Box
 
 CUBE = Box([0, 0, 0], [1, 1, 1])
 HALF = UniformSizes(0.5)

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, Packing
-from porefv.dem import DEM, Plate
+from porefv.dem.dem import DEM
+from porefv.dem.material import Plate
 from porefv.dem.protocol import GrainModel
 from porefv.errors import InputError
 
@@ -64,7 +65,7 @@ def test_two_halves_are_a_step():
     whole.run(5)
     for _ in range(5):
         halves.predict()
-        halves.correct(force[np.argsort(halves.slots)], np.zeros(6))
+        halves.correct(force[np.argsort(halves.rows)], np.zeros(6))
     assert_array_equal(whole.positions, halves.positions)
     assert_array_equal(whole.velocities, halves.velocities)
     assert (whole.time, whole.steps) == (halves.time, halves.steps)
@@ -75,7 +76,7 @@ def test_the_first_half_says_what_the_second_does():
     push = np.tile([1.0, 2.0, 0.0], (3, 1))
     velocities, speeds, mobilities, _ = grains.predict()
     grains.correct(push, np.zeros(6))
-    assert_allclose(grains.velocities, (velocities + mobilities[:, None] * push)[grains.slots], rtol=1e-14)
+    assert_allclose(grains.velocities, (velocities + mobilities[:, None] * push)[grains.rows], rtol=1e-14)
     assert_allclose(grains.wall_velocities[np.arange(6), np.arange(6) // 2] * [-1, 1, -1, 1, -1, 1], speeds)
 
 

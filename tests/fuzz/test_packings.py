@@ -6,12 +6,16 @@ import numpy as np
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from porefv.flow.walls import Wall, Walls
-from porefv.conductance import EffectiveRadius, HydraulicRadius, SectionFriction
+from porefv.conductance.effective_radius import EffectiveRadius
+from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import PorefvError
-from porefv.flow.pore_flow import Fluid, PoreFlow
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.packing.packing import WALLS, Box, Packing
+from porefv.packing.box import WALLS, Box
+from porefv.packing.packing import Packing
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 

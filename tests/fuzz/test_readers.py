@@ -11,11 +11,13 @@ from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from porefv import cli, results
-from porefv.flow.walls import Walls
 from porefv.errors import PorefvError
-from porefv.flow.pore_flow import Fluid, PoreFlow
-from porefv.packing.files import read_packing
-from porefv.packing.packing import Box, Packing
+from porefv.flow.fluid import Fluid
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+from porefv.packing.box import Box
+from porefv.packing.files.registry import read_packing
+from porefv.packing.packing import Packing
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 

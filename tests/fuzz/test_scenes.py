@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from porefv import results
 from porefv.errors import PorefvError
-from porefv.packing.packing import WALLS
-from porefv.scenes.flow_scene import Scene
+from porefv.packing.box import WALLS
+from porefv.scenes.flow_scene import FlowScene
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
 
@@ -109,7 +109,7 @@ def test_a_scene_is_solved_or_refused(folder, text):
     path: Path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        scene = Scene.read(path)
+        scene = FlowScene.read(path)
         scene.check()
         directory = scene.solve(force=True)
         assert results.read(directory).summary["scene"] == str(path)

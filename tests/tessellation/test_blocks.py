@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from porefv import Box, Packing
-from porefv.tessellation import RegularTriangulation, blocks
+from porefv.tessellation import blocks
+from porefv.tessellation.triangulation import RegularTriangulation
 
 
 def random_spheres(n, ratio, seed):
@@ -33,9 +34,9 @@ def test_blocks_give_the_cells_of_one_piece(case, monkeypatch):
         pytest.skip("needs two threads")
     centres, radii, size = CASES[case]
     box = Box([0, 0, 0], size)
-    monkeypatch.setattr(blocks, "_LEAST", 10**9)
+    monkeypatch.setattr(blocks, "LEAST_BLOCK", 10**9)
     whole = RegularTriangulation(centres, radii, box)
-    monkeypatch.setattr(blocks, "_LEAST", 1000)
+    monkeypatch.setattr(blocks, "LEAST_BLOCK", 1000)
     monkeypatch.setattr(blocks, "get_num_threads", lambda: 3)
     pieces = RegularTriangulation(centres, radii, box)
 
@@ -49,11 +50,11 @@ def test_a_halo_that_is_too_narrow_is_widened(monkeypatch):
     centres = np.concatenate([0.3 * rng.random((3000, 3)), 0.3 + 0.69 * rng.random((30, 3))])
     packing = Packing(centres, np.full(len(centres), 1e-3), Box([0, 0, 0], [1, 1, 1]))
     widened = []
-    certain = blocks._certain
-    monkeypatch.setattr(blocks, "_certain", lambda *a: widened.append(certain(*a)) or widened[-1])
-    monkeypatch.setattr(blocks, "_LEAST", 10**9)
+    certain = blocks.cells_are_certain
+    monkeypatch.setattr(blocks, "cells_are_certain", lambda *a: widened.append(certain(*a)) or widened[-1])
+    monkeypatch.setattr(blocks, "LEAST_BLOCK", 10**9)
     whole = RegularTriangulation(packing.centres, packing.radii, packing.box)
-    monkeypatch.setattr(blocks, "_LEAST", 1000)
+    monkeypatch.setattr(blocks, "LEAST_BLOCK", 1000)
     monkeypatch.setattr(blocks, "get_num_threads", lambda: 2)
     assert_same_cells(whole, RegularTriangulation(packing.centres, packing.radii, packing.box))
     assert not all(widened)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from porefv.packing.box import WALL_NORMALS
 from porefv.tessellation.predicates import in_conflict, power_centre, side
-from porefv.tessellation.triangulation import wall_normals
 
 N = 5  # spheres 0 ... 3 may be vertices of the cell, sphere 4 is asked about; walls are 5 ... 10
 Q = 4
@@ -30,7 +30,7 @@ radii = st.one_of(st.sampled_from([0.125, 0.125, 0.25]), st.floats(1e-6, 0.5))
 @st.composite
 def problems(draw):
     """(cell, points, weights) of a positively oriented cell and five spheres in the unit cube."""
-    points = np.concatenate([draw(st.lists(st.tuples(*[coordinates] * 3), min_size=N, max_size=N)), wall_normals()])
+    points = np.concatenate([draw(st.lists(st.tuples(*[coordinates] * 3), min_size=N, max_size=N)), WALL_NORMALS])
     assume(len({tuple(p) for p in points[:N]}) == N)
     weights = np.array(draw(st.lists(radii, min_size=N, max_size=N)) + [0.0, 1.0] * 3)
     n_walls = draw(st.integers(0, 3))
@@ -129,7 +129,7 @@ def test_ties_of_a_cubic_lattice_are_broken_by_weights_lowered_in_the_order_of_t
     weights = np.array([0.125] * N + [0.0, 1.0] * 3)
     ties = 0
     for _ in range(1500):
-        points = np.concatenate([grid[rng.choice(27, N, replace=False)], wall_normals()])
+        points = np.concatenate([grid[rng.choice(27, N, replace=False)], WALL_NORMALS])
         walls = N + 2 * np.arange(3) + rng.integers(0, 2, 3)
         cell = np.arange(4, dtype=np.int32)
         n_walls = rng.integers(0, 4)

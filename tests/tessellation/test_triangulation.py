@@ -12,9 +12,8 @@ from scipy.spatial import ConvexHull
 
 from porefv.errors import ComputationError
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.packing.packing import Box
-from porefv.tessellation import RegularTriangulation
-from porefv.tessellation.triangulation import exact_origin
+from porefv.packing.box import Box
+from porefv.tessellation.triangulation import RegularTriangulation, exact_origin
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 

@@ -64,7 +64,7 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
             mesh_centres=packing.centres,
             mesh_radii=packing.radii,
             mesh_box=np.stack([packing.box.lower, packing.box.upper]),
-            factor_mobilities=coupling._pores.factor_mobilities,
+            factor_mobilities=coupling.equation.factor_mobilities,
             pressure=coupling._pressure,
             rate=coupling._rate,
             products=coupling._products,
@@ -108,5 +108,5 @@ def _build(header: dict[str, Any], content: dict[str, np.ndarray], path: str | P
         raise ValueError(f"products have shape {content['products'].shape}")
     coupling._products = content["products"]
     coupling._fresh = bool(header["fresh"])
-    coupling._pores.factor_mobilities = content["factor_mobilities"]
+    coupling.equation.factor_mobilities = content["factor_mobilities"]
     return coupling

@@ -32,7 +32,7 @@ SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
 # Drag number up to which `auto` is explicit in the drag, and beyond which an explicit step is refused. It is unstable
 # from 2 on; below 0.1 the error of being explicit is a few parts in a hundred of the fastest drag.
-_EXPLICIT, _UNSTABLE = 0.1, 1.8
+EXPLICIT, UNSTABLE = 0.1, 1.8
 # Bound on the power's relative error where pressures start anew on another mesh.
 _ANEW = 1e-8
 # Steps after which products of pressures with the matrix are worked out, not carried on, lest rounding gathers.
@@ -98,6 +98,8 @@ class Coupling:
         The current one.
     scheme : str
         That of the current mesh, `auto` resolved.
+    equation : CoupledPressure
+        The pressure equation on the current mesh.
     drag_number : float or None
         Of the current mesh, where the scheme asks for it; a lower bound where `auto` has seen enough.
     effort : Effort
@@ -117,7 +119,7 @@ class Coupling:
     mesh: PoreMesh
     scheme: str
     drag_number: float | None
-    _pores: CoupledPressure
+    equation: CoupledPressure
     _pressure: np.ndarray  # of the free pores
     _rate: np.ndarray  # what the last step changed them by
     _products: np.ndarray  # (2, n_free): products of both with the matrix; (2, 0) where that is not steady
@@ -169,7 +171,7 @@ class Coupling:
         """
         for _ in range(steps):
             if self.effort.steps % _STRIDE == 0 and self._moved() > self.options["renewal"]:
-                self._renew()
+                self.renew_mesh()
             self._step()
 
     def _step(self) -> None:
@@ -185,13 +187,13 @@ class Coupling:
         with self._timed("pressure"):
             # Half of what the last step changed: all of it would pass its noise on.
             guess, product = self._pressure + 0.5 * self._rate, None
-            steady = self._pores.is_steady(wall_mobilities)
+            steady = self.equation.is_steady(wall_mobilities)
             if steady and self._products.size and self.effort.steps % _ANEW_EVERY:
                 product = self._products[0] + 0.5 * self._products[1]
             asked = self.options["tolerance"]
             tolerance = min(asked, _ANEW) if self._fresh else asked
             with threads_for(len(guess)):
-                pressure, product, iterations = self._pores.solve(moves, wall_mobilities, guess, tolerance, product)
+                pressure, product, iterations = self.equation.solve(moves, wall_mobilities, guess, tolerance, product)
             # The change is kept only where its product with the matrix is known too, or is not needed.
             goes_on = not self._fresh and (self._products.size > 0 or not steady)
             self._rate = pressure - self._pressure if goes_on else np.zeros_like(pressure)
@@ -202,7 +204,7 @@ class Coupling:
                 self._products = np.zeros((2, 0))
             self._pressure, self._fresh = pressure, False
         with self._timed("forces"):
-            forces = self._pores.forces(pressure)
+            forces = self.equation.forces(pressure)
             thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
         with self._timed("grains"):
             self.grains.correct(forces[:-6], thrusts)
@@ -227,9 +229,9 @@ class Coupling:
         ).all()
         self.walls = walls
         if same:
-            self._pores.set_pressures(walls.pressures)
+            self.equation.set_pressures(walls.pressures)
         else:
-            self._renew()
+            self.renew_mesh()
 
     # ---- the mesh -----------------------------------------------------------------------------------------------
 
@@ -238,13 +240,13 @@ class Coupling:
         way = self.grains.positions - self.mesh.packing.centres
         return math.sqrt(float((way**2).sum(axis=1).max())) / self._mean_radius
 
-    def _renew(self) -> None:
+    def renew_mesh(self) -> None:
         """Make the mesh anew, with the pressures there were."""
         around = _mean_by_vertex(self.mesh, self.cell_pressure)
         self._set_out(Packing(self.grains.positions, self.grains.radii, self.grains.box))
         cells = around[self.mesh.cells].mean(axis=1)
         pores = np.bincount(self.mesh.cell_pore, cells, self.mesh.n_pores) / np.bincount(self.mesh.cell_pore)
-        self._pressure = pores[self._pores.free]
+        self._pressure = pores[self.equation.free]
 
     def _set_out(self, packing: Packing) -> None:
         """Make the mesh of a packing, its conductances and its exchange with the grains, without pressures."""
@@ -266,7 +268,7 @@ class Coupling:
             self.mesh = mesh
             self._mean_radius = float(packing.radii.mean())
             self._closed = bool(np.isnan(pressures).all())
-            self._pressure, self._rate = np.zeros((2, np.count_nonzero(self._pores.free)))
+            self._pressure, self._rate = np.zeros((2, np.count_nonzero(self.equation.free)))
             self._products = np.zeros((2, 0))
             self._fresh = True
             self._moves = np.zeros((len(packing) + 6, 3))
@@ -287,26 +289,26 @@ class Coupling:
                     )
                 self.scheme = "implicit-drag"
             else:
-                self.drag_number = explicit.drag_number(drag, _EXPLICIT if asked == "auto" else np.inf)
+                self.drag_number = explicit.drag_number(drag, EXPLICIT if asked == "auto" else np.inf)
                 if asked == "auto":
-                    self.scheme = "semi-implicit" if self.drag_number <= _EXPLICIT else "implicit-drag"
-                elif self.drag_number > _UNSTABLE:
+                    self.scheme = "semi-implicit" if self.drag_number <= EXPLICIT else "implicit-drag"
+                elif self.drag_number > UNSTABLE:
                     raise InputError(
                         f"a semi-implicit step of {self.grains.step:.3g} s is unstable: its drag number is "
-                        f"{self.drag_number:.3g}, {_UNSTABLE} at most. Use scheme = 'implicit-drag', or a step below "
-                        f"{self.grains.step * _UNSTABLE / self.drag_number:.2g} s"
+                        f"{self.drag_number:.3g}, {UNSTABLE} at most. Use scheme = 'implicit-drag', or a step below "
+                        f"{self.grains.step * UNSTABLE / self.drag_number:.2g} s"
                     )
             if self.scheme == "semi-implicit":
-                self._pores = explicit
+                self.equation = explicit
                 return
-        self._pores = pores(drag)
+        self.equation = pores(drag)
 
     # ---- what there is ------------------------------------------------------------------------------------------
 
     @property
     def pressure(self) -> np.ndarray:
         """(n_pores,): piezometric pressure of each pore of `mesh` over the last step [Pa]."""
-        return self._pores.full(self._pressure)
+        return self.equation.full(self._pressure)
 
     @property
     def cell_pressure(self) -> np.ndarray:
@@ -316,12 +318,12 @@ class Coupling:
     @property
     def fluid_forces(self) -> np.ndarray:
         """(n, 3): force of the fluid on each grain over the last step, by id [N]."""
-        return self._pores.forces(self._pressure)[:-6][self.grains.rows]
+        return self.equation.forces(self._pressure)[:-6][self.grains.rows]
 
     @property
     def wall_fluid_forces(self) -> np.ndarray:
         """(6, 3): force of the fluid on each wall over the last step [N]."""
-        return self._pores.forces(self._pressure)[-6:]
+        return self.equation.forces(self._pressure)[-6:]
 
     def _velocities(self) -> np.ndarray:
         velocities = np.empty_like(self._moves)
@@ -332,13 +334,13 @@ class Coupling:
     @property
     def wall_flux(self) -> dict[str, float]:
         """Flux into the sample through each wall over the last step [m³/s]."""
-        fluxes = self._pores.wall_fluxes(self._pressure, self._velocities())
+        fluxes = self.equation.wall_fluxes(self._pressure, self._velocities())
         return {name: float(q) for name, q in zip(WALLS, fluxes, strict=True)}
 
     @property
     def power(self) -> Power:
         """Where the fluid's power went over the last step."""
-        return self._pores.power(self._pressure, self._velocities())
+        return self.equation.power(self._pressure, self._velocities())
 
     @contextmanager
     def _timed(self, part: str) -> Iterator[None]:

@@ -129,7 +129,7 @@ class DEM:
                 f"its stiffest contact); leave it out to have {SAFETY} of that"
             )
         self.step = float(step)
-        self._list_pairs()
+        self.list_pairs()
 
     # ---- set-up -------------------------------------------------------------------------------------------------
 
@@ -163,7 +163,7 @@ class DEM:
         self._state[:, 3] *= factor
         self._measure_grains()
         self.step = part * self.critical_step
-        self._list_pairs()
+        self.list_pairs()
 
     def _measure_grains(self) -> None:
         r = self._state[:, 3]
@@ -178,7 +178,7 @@ class DEM:
         stiffest = 2.0 * self.material.young * r * r.max() / (r + r.max())
         return float(np.sqrt(1.0 / (self._inverse_mass * stiffest)).min())
 
-    def _list_pairs(self) -> None:
+    def list_pairs(self) -> None:
         """List the pairs that may touch before any grain has moved by half the skin, and keep what contacts hold."""
         x, r = np.ascontiguousarray(self._state[:, :3]), np.ascontiguousarray(self._state[:, 3])
         skin = _SKIN * float(r.min())
@@ -288,8 +288,13 @@ class DEM:
         if reason == RUNAWAY:
             self._fail()
         if reason == CROWDED:
-            self._list_pairs()
+            self.list_pairs()
         return taken
+
+    @property
+    def moved_since_listing(self) -> float:
+        """Largest distance that a grain has moved since the pairs that may touch were listed [m]."""
+        return float(np.sqrt(((self._state[:, :3] - self._start) ** 2).sum(axis=1).max()))
 
     @property
     def fastest(self) -> float:

@@ -32,7 +32,7 @@ def flow_picture(
     flow: PoreFlow, *, forces: bool = True, title: str = "", size: tuple[int, int] = SIZE
 ) -> pyvista.Plotter:
     """The `picture` of a flow, whose pressures and, if asked for, forces are computed if they are not yet."""
-    pv = _pyvista()
+    pv = load_pyvista()
     data = {"total_force": flow.forces.total} if forces else {}
     spheres = pv.PolyData(spheres_polydata(flow.mesh.packing, **data))
     return picture(spheres, flow.mesh.to_pyvista(pressure=flow.pressure), walls=flow.walls, title=title, size=size)
@@ -72,7 +72,7 @@ def picture(
     ComputationError
         If this machine cannot draw.
     """
-    pv = _pyvista()
+    pv = load_pyvista()
     plotter = pv.Plotter(off_screen=True, window_size=size)
     plotter.set_background("white")
     axis = 1 if walls is None or walls.axis is None else walls.axis
@@ -209,17 +209,17 @@ def _font(size: tuple[int, int], points: int) -> int:
     return max(6, round(points * size[1] / SIZE[1]))
 
 
-def _pyvista() -> Any:
+def load_pyvista() -> Any:
     """The module pyvista, on a machine that can draw."""
     # Without a display VTK would first try, and complain.
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     pyvista = load("pyvista", "Drawing a picture")
-    _check_drawing()
+    ensure_drawing()
     return pyvista
 
 
-def _check_drawing() -> None:
+def ensure_drawing() -> None:
     """VTK's last resort is OSMesa, and a crash without it."""
     from vtkmodules.vtkCommonCore import vtkObject
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
@@ -229,7 +229,7 @@ def _check_drawing() -> None:
     window = vtkRenderWindow().GetClassName()
     vtkObject.SetGlobalWarningDisplay(warns)
     if window == "vtkOSOpenGLRenderWindow" and not any(
-        map(_loads, ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"))
+        map(library_loads, ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"))
     ):
         raise ComputationError(
             "cannot draw: there is no display, and neither EGL nor OSMesa is installed to draw without one. "
@@ -237,7 +237,7 @@ def _check_drawing() -> None:
         )
 
 
-def _loads(library: str) -> bool:
+def library_loads(library: str) -> bool:
     try:
         ctypes.CDLL(library)
     except OSError:

@@ -25,6 +25,8 @@ import numpy as np
 from porefv.dem.dem import DEM
 from porefv.dem.state import Contacts
 from porefv.errors import InputError, counted
+from porefv.export.vtk_datasets import spheres_polydata
+from porefv.export.vtk_files import attach, cell_array, vtk_data_model, vtk_points, write_xml
 from porefv.system.atomic_files import atomic_write
 
 if TYPE_CHECKING:
@@ -67,8 +69,6 @@ class Trajectory:
     """
 
     def __init__(self, directory: str | PathLike[str], dem: DEM, contacts: bool = False):
-        from porefv.export.vtk_files import vtk_data_model
-
         vtk_data_model()  # that it is there is known before a long run, not after it
         self.directory = Path(directory)
         self.dem = dem
@@ -99,7 +99,6 @@ class Trajectory:
         InputError
             If a file cannot be written.
         """
-        from porefv.export.vtk_files import write_xml
 
         dem = self.dem
         contacts = dem.contacts
@@ -147,7 +146,6 @@ def _resultants(dem: DEM, contacts: Contacts) -> np.ndarray:
 
 
 def _grains(dem: DEM, forces: np.ndarray) -> vtkPolyData:
-    from porefv.export.vtk_datasets import spheres_polydata
 
     return spheres_polydata(dem.packing, velocity=dem.velocities, spin=dem.spins, force=forces)
 
@@ -176,7 +174,6 @@ def _polydata(
     points: np.ndarray, data: dict[str, np.ndarray], lines: np.ndarray | None = None, polygons: np.ndarray | None = None
 ) -> vtkPolyData:
     """Points, with lines or polygons that have data; there may be none, and the data then is empty, too."""
-    from porefv.export.vtk_files import attach, cell_array, vtk_data_model, vtk_points
 
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(points))

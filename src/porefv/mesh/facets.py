@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from porefv.mesh.facet_cross_sections import facet_cross_sections
 from porefv.mesh.facet_kernels import enumerate_facets, facet_centroids, row_sums
-from porefv.mesh.facet_sections import facet_sections
 from porefv.mesh.facet_volumes import facet_volumes
 
 if TYPE_CHECKING:
@@ -61,10 +61,10 @@ class Facets:
     # ---- the facet as a cross-section -------------------------------------------------------------------------------
 
     @cached_property
-    def _sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _cross_sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         mesh, f = self.mesh, len(self)
         arrays = np.empty((f, 3)), np.empty(f), np.empty(f), np.empty((f, 3)), np.empty(f, bool)
-        facet_sections(
+        facet_cross_sections(
             self.cells, self.vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, *arrays
         )
         return arrays
@@ -72,27 +72,27 @@ class Facets:
     @property
     def normals(self) -> np.ndarray:
         """(f, 3): unit normal of each facet, from its first cell to its second."""
-        return self._sections[0]
+        return self._cross_sections[0]
 
     @property
     def lengths(self) -> np.ndarray:
         """(f,): L = (P_j - P_i)·n of each facet [m]."""
-        return self._sections[1]
+        return self._cross_sections[1]
 
     @property
     def fluid_areas(self) -> np.ndarray:
         """(f,): A^f = A - Σ A^k of each facet [m²]."""
-        return self._sections[2]
+        return self._cross_sections[2]
 
     @property
     def sectors(self) -> np.ndarray:
         """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
-        return self._sections[3]
+        return self._cross_sections[3]
 
     @property
     def covered(self) -> np.ndarray:
         """(f,) bool: facets covered by their spheres, all of which hold the facet's radical centre."""
-        return self._sections[4]
+        return self._cross_sections[4]
 
     @property
     def areas(self) -> np.ndarray:

@@ -238,7 +238,11 @@ class StokesReference:
 
     def _ensure(self, mesh: PoreMesh) -> None:
         pairs = [(mesh.packing.centres, self.packing.centres), (mesh.packing.radii, self.packing.radii)]
-        pairs += [(getattr(mesh, name), getattr(self, name)) for name in ("cells", "facet_vertices", "facet_cells")]
+        pairs += [
+            (mesh.cells, self.cells),
+            (mesh.facets.vertices, self.facet_vertices),
+            (mesh.facets.cells, self.facet_cells),
+        ]
         if not all(np.array_equal(theirs, ours) for theirs, ours in pairs):
             raise InputError(
                 f"{self.name}: the mesh is not the one these values were read off: another packing, or another "

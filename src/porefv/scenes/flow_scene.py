@@ -14,8 +14,7 @@ from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
-from porefv.results.directory import save
-from porefv.results.writing import QUANTITIES, check_target, stages, writing
+from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.shared_tables import PackingFile, read_conductance, read_fluid, read_packing_file
 from porefv.scenes.table import SceneFile, Table
 from porefv.solvers.solver import SOLVERS

@@ -63,10 +63,10 @@ class PackingProgress(Progress):
         """Take a state to be drawn."""
         self.state = state
 
-    def _line(self, name: str, seconds: float) -> str:
+    def line(self, name: str, seconds: float) -> str:
         now = self.state
         if now is None:
-            return super()._line(name, seconds)
+            return super().line(name, seconds)
         # Not above 80 columns: what is beyond is cut off.
         state = f"stress {now.stress:.4g} Pa  porosity {now.porosity:.4f}  unbalanced {now.unbalanced:.2g}"
         return f"porefv: {now.stage}  {seconds:.1f} s  {state}"

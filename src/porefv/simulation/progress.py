@@ -53,10 +53,10 @@ class SimulationProgress(Progress):
             self._start = (time.perf_counter(), state.time)
         self.state = state
 
-    def _line(self, name: str, seconds: float) -> str:
+    def line(self, name: str, seconds: float) -> str:
         now = self.state
         if now is None or self._start is None:
-            return super()._line(name, seconds)
+            return super().line(name, seconds)
         # Not above 80 columns: what is beyond is cut off.
         if now.total is None:
             course = f"{now.time:.4g} s, unbalanced {now.unbalanced:.0e}"

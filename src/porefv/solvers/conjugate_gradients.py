@@ -20,7 +20,7 @@ from porefv.system.threads import threads_for
 _BLOCK = 16384
 # By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
 _REACH = 1e-10
-_MAX_ITERATIONS = 500
+MAX_ITERATIONS = 500
 # Corrections that may fail to halve the imbalance before it is given up: rounding of the first ones, in throats
 # 10¹⁶ times as conductive as others, makes flows larger than all there are, which the next ones take away.
 _PATIENCE = 3
@@ -82,10 +82,10 @@ def _iterate(a, rhs, preconditioner, tolerance, guess):
         r = a.residual(rhs, x)
         lost = float(np.abs(r).sum())
         flow, floor = _measures(a, rhs, x)
-        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= _MAX_ITERATIONS:
+        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= MAX_ITERATIONS:
             return x, iterations
         before = lost
-        iterations += _descend(a, x, r, preconditioner, 0.0, enough, _MAX_ITERATIONS - iterations)
+        iterations += _descend(a, x, r, preconditioner, 0.0, enough, MAX_ITERATIONS - iterations)
 
 
 def _descend(a, x, r, preconditioner, least, enough, limit):
@@ -179,7 +179,7 @@ def refined(
             if best is None or lost < best.lost:
                 best = Refined(x, rest, total, lost, flow, error)
             stalled = rounds - halved >= _PATIENCE
-            if (lost <= tolerance * flow and error <= accuracy) or stalled or total >= _MAX_ITERATIONS:
+            if (lost <= tolerance * flow and error <= accuracy) or stalled or total >= MAX_ITERATIONS:
                 break
             hasty = error == np.inf and halved == rounds  # else as far as one residual reaches
             correction, iterations = _correction(
@@ -211,7 +211,7 @@ def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
         return 0.5 * tolerance * flow
 
     least = _REACH * float(np.abs(r).sum())
-    return d, _descend(a, d, r.copy(), preconditioner, least, enough, _MAX_ITERATIONS)
+    return d, _descend(a, d, r.copy(), preconditioner, least, enough, MAX_ITERATIONS)
 
 
 @njit(cache=True, parallel=True)

@@ -73,13 +73,13 @@ class Progress:
     def _paint(self, name: str, begin: float, done: Event) -> None:
         # A compiled kernel may hold the interpreter's lock: the line then stands still, but it stands.
         while True:
-            line = self._line(name, time.perf_counter() - begin)
+            line = self.line(name, time.perf_counter() - begin)
             self._stream.write("\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1])
             self._stream.flush()
             if done.wait(_PERIOD):
                 return
 
-    def _line(self, name: str, seconds: float) -> str:
+    def line(self, name: str, seconds: float) -> str:
         if name not in self.stages:
             return f"porefv: {name}  {seconds:.1f} s"
         number, total = self.stages.index(name), len(self.stages)

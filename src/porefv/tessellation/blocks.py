@@ -20,7 +20,7 @@ from porefv.tessellation import insertion
 from porefv.tessellation.ordering import rounds
 
 # Fewer spheres than this are not worth a block of their own: the halo would cost more than the thread gains.
-_LEAST = 8_000
+LEAST_BLOCK = 8_000
 _FOREIGN = -2
 
 
@@ -38,7 +38,7 @@ def triangulate(points: np.ndarray, weights: np.ndarray, n: int, extent: np.ndar
     -------
     cells (m, 4), neighbours (m, 4), planes (m, 4)
     """
-    n_blocks = max(1, min(get_num_threads(), n // _LEAST))
+    n_blocks = max(1, min(get_num_threads(), n // LEAST_BLOCK))
     if n_blocks == 1:
         cells, neighbours, planes = _build(n, points, weights, extent)
         return _compact(cells, neighbours, planes, n, np.ones(n, np.bool_))
@@ -97,7 +97,7 @@ def _block(low, high, reach, axis, n, points, weights, extent):
         k = len(spheres)
         cells, neighbours, planes = _build(k, points[names], weights[names], extent)
         largest = float(weights[:n].max())
-        if k == n or _certain(
+        if k == n or cells_are_certain(
             cells, planes, own, k, points[names], weights[names], largest, axis, low - reach, high + reach
         ):
             cells, neighbours, planes = _compact(cells, neighbours, planes, k, own)
@@ -126,7 +126,7 @@ def _join(blocks):
 
 
 @njit(cache=True, nogil=True)
-def _certain(cells, planes, own, n, points, weights, largest, axis, low, high):
+def cells_are_certain(cells, planes, own, n, points, weights, largest, axis, low, high):
     """Whether every cell at a block's own spheres keeps clear of all spheres outside low <= x < high."""
     for t in range(cells.shape[0]):
         if cells[t, 0] < 0:

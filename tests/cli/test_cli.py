@@ -1,0 +1,264 @@
+import io
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from porefv.cli.program import main
+from porefv.errors import ComputationError
+from porefv.scenes.flow_scene import FlowScene
+from porefv.system.progress import Progress
+
+DATA = Path(__file__).parents[2] / "data"
+
+SCENE = """\
+packing = "{packing}"
+[walls]
+y_min = {{ pressure = 1.0 }}
+y_max = {{ pressure = 0.0 }}
+[output]
+quantities = ["permeability", "pressure", "forces"]
+vtk = {vtk}
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """The path of a scene of 25 spheres."""
+    return write_scene(tmp_path, "n25_s1.csv")
+
+
+def write_scene(folder, packing, vtk="false"):
+    path = folder / "scene.toml"
+    path.write_text(SCENE.format(packing=(DATA / "packings" / packing).as_posix(), vtk=vtk))
+    return path
+
+
+def run(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "porefv", *map(str, arguments)], capture_output=True, text=True, **options
+    )
+
+
+# The four commands
+
+
+def test_solve_writes_results_and_says_where(scene, capsys):
+    assert main(["solve", str(scene)]) == 0
+    said = capsys.readouterr()
+    assert re.search(r"25 spheres, 122 pores, permeability 0\.000190\d+ m², force balance", said.out)
+    assert f"results in {scene.parent / 'results'}" in said.out
+    assert said.err == ""
+    assert sorted(p.name for p in (scene.parent / "results").iterdir()) == ["forces.csv", "summary.json"]
+
+
+def test_quiet_solve_says_nothing(scene, capsys):
+    assert main(["solve", str(scene), "--quiet", "--threads", "1"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_solve_overwrites_only_by_force(scene, capsys):
+    assert main(["solve", str(scene)]) == 0
+    assert main(["solve", str(scene)]) == 2
+    assert "already holds results" in capsys.readouterr().err
+    assert main(["solve", str(scene), "--force"]) == 0
+
+
+def test_check_tells_what_was_found_and_writes_nothing(scene, capsys):
+    assert main(["check", str(scene)]) == 0
+    out = capsys.readouterr().out
+    assert "scene.toml is sound" in out
+    assert "25 spheres, radii 0.111 to 0.2078 m" in out
+    assert "y_min: 1 Pa, no-slip" in out
+    assert "--force" not in out
+    assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
+
+
+def test_check_warns_of_results_that_exist(scene, capsys):
+    main(["solve", str(scene), "--quiet"])
+    assert main(["check", str(scene)]) == 0
+    assert "(exists: solve needs --force)" in capsys.readouterr().out
+
+
+def test_info_prints_a_summary(scene, capsys):
+    main(["solve", str(scene), "--quiet"])
+    assert main(["info", str(scene.parent / "results")]) == 0
+    out = capsys.readouterr().out
+    for line in (
+        r"Packing\n", r"  porosity +0\.5335", r"  throats +240\n", r"  permeability +0\.000190\d+ m²\n",
+        r"  hydraulic conductivity +\S+ m/s\n", r"  force balance +\S+\n", r"  solver +direct, .* imbalance",
+    ):  # fmt: skip
+        assert re.search(line, out), line
+
+
+def test_info_of_the_pores_alone(tmp_path, capsys):
+    path = write_scene(tmp_path, "n25_s1.csv")
+    path.write_text(path.read_text().replace('["permeability", "pressure", "forces"]', "[]"))
+    assert main(["solve", str(path)]) == 0
+    assert main(["info", str(tmp_path / "results")]) == 0
+    out = capsys.readouterr().out
+    assert "122" in out and "permeability" not in out
+
+
+def test_plot_draws_a_picture(tmp_path, capsys):
+    pytest.importorskip("pyvista")
+    path = write_scene(tmp_path, "nine_0.72.csv", vtk="true")
+    main(["solve", str(path), "--quiet"])
+    if main(["plot", str(tmp_path / "results"), "--out", str(tmp_path / "nine.png")]) == 1:
+        pytest.skip(capsys.readouterr().err)
+    assert (tmp_path / "nine.png").read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr() == ("", "")
+
+
+# What is imported
+
+
+def test_help_comes_at_once():
+    code = "import sys; from porefv.cli.program import main; main(['--help'])"
+    seconds = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+        seconds.append(time.perf_counter() - begin)
+    assert min(seconds) < 0.3
+    watched = "import sys\ntry:\n from porefv.cli.program import main; main(['--help'])\nfinally:\n"
+    watched += " assert not {'numpy', 'numba', 'scipy', 'pyvista'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", watched], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("vtk", ["false", "true"])
+def test_vtk_is_imported_only_if_asked_for(tmp_path, vtk):
+    path = write_scene(tmp_path, "n25_s1.csv", vtk)
+    code = (
+        "import sys\nfrom porefv.cli.program import main\n"
+        f"assert main(['solve', {str(path)!r}]) == 0\n"
+        "names = ('vtkmodules', 'pyvista', 'meshio', 'fipy', 'matplotlib')\n"
+        "print([name for name in names if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    # pyvista is for reading and drawing: files are written by VTK itself, which loads sooner.
+    assert done.stdout.splitlines()[-1] == ("[]" if vtk == "false" else "['vtkmodules']")
+
+
+# Errors
+
+
+@pytest.mark.parametrize("arguments", [
+    ["solve", "missing.toml"], ["check", "missing.toml"], ["info", "missing"],
+    ["plot", "missing", "--out", "a.png"], ["solve"], ["paint"], [],
+    ["solve", "scene.toml", "--threads", "0"], ["plot", "missing"],
+])  # fmt: skip
+def test_bad_input_is_status_2_and_no_traceback(arguments, tmp_path):
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert re.search(r"^porefv( \w+)?: error: ", done.stderr, re.MULTILINE)
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_an_unknown_option_is_refused_with_the_usage_of_its_command(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["plot", "results", "--out", "picture.png", "--force"])
+    error = capsys.readouterr().err
+    assert error.startswith("usage: porefv plot ") and "porefv plot: error: unrecognized arguments: --force" in error
+
+
+def test_errors_name_file_and_line(scene):
+    scene.write_text(scene.read_text().replace("[walls]", "[fluid]\nviscosity = 0\n[walls]"))
+    done = run("solve", scene.name, cwd=scene.parent)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "porefv: error: scene.toml, line 3: [fluid] viscosity must be a positive number of Pa s, not 0.0\n"
+    )
+
+
+def test_failed_computation_is_status_1(scene, capsys, monkeypatch):
+    def fail(*arguments, **options):
+        raise ComputationError("the solver stopped")
+
+    monkeypatch.setattr(FlowScene, "pore_flow", fail)
+    assert main(["solve", str(scene)]) == 1
+    assert capsys.readouterr().err == "porefv: error: the solver stopped\n"
+    assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
+
+
+def test_interruption_is_status_130(scene, capsys, monkeypatch):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(FlowScene, "pore_flow", interrupt)
+    assert main(["solve", str(scene)]) == 130
+    assert capsys.readouterr().err == "porefv: error: interrupted; nothing was written\n"
+    assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    "error, said", [(ZeroDivisionError("0"), "defect of porefv"), (MemoryError(), "not enough memory")]
+)
+def test_unforeseen_errors_are_status_1_and_no_traceback(scene, capsys, monkeypatch, error, said):
+    def fail(*arguments, **options):
+        raise error
+
+    monkeypatch.setattr(FlowScene, "pore_flow", fail)
+    assert main(["solve", str(scene)]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_reader_that_goes_away_is_no_error(scene):
+    main(["solve", str(scene), "--quiet"])
+    command = f"{sys.executable} -m porefv info {scene.parent / 'results'} | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
+    assert done.stdout.strip() == "0"
+    assert done.stderr == ""
+
+
+# Progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_terminal_shows_stages_and_is_left_clean():
+    terminal = Terminal()
+    progress = Progress(["reading", "writing"], terminal)
+    progress.note("compiling")
+    for stage in progress.stages:
+        with progress.stage(stage):
+            time.sleep(0.02)
+    text = terminal.getvalue()
+    assert text.startswith("porefv: compiling\n")
+    assert "[....................] 1/2 reading" in text
+    assert "[##########..........] 2/2 writing" in text
+    assert text.endswith("\r\x1b[K")
+    assert list(progress.seconds) == ["reading", "writing"]
+    assert all(seconds > 0.01 for seconds in progress.seconds.values())
+
+
+@pytest.mark.parametrize("stream, quiet", [(io.StringIO(), False), (Terminal(), True)])
+def test_log_and_quiet_terminal_show_nothing(stream, quiet):
+    progress = Progress(["reading"], stream, quiet=quiet)
+    progress.note("compiling")
+    with progress.stage("reading"):
+        pass
+    assert stream.getvalue() == ""
+    assert "reading" in progress.seconds
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a terminal to pretend")
+def test_solve_draws_its_progress_on_a_terminal(scene):
+    import pty
+
+    leader, follower = pty.openpty()
+    command = [sys.executable, "-m", "porefv", "solve", str(scene)]
+    subprocess.run(command, stdout=subprocess.PIPE, stderr=follower, check=True)
+    os.close(follower)
+    text = os.read(leader, 1 << 16).decode()
+    os.close(leader)
+    for number, stage in enumerate(FlowScene.read(scene).stages, 1):
+        assert f"{number}/7 {stage}" in text

@@ -1,0 +1,139 @@
+"""README and docs are true: their Python runs, commands say what is printed, scenes are valid, links lead somewhere."""
+
+import contextlib
+import inspect
+import io
+import os
+import re
+import shlex
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from porefv import cli
+from porefv.scenes import flow_scene, shared_tables
+from porefv.scenes.flow_scene import FlowScene
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "data/README.md")]
+PAGES += sorted((ROOT / "docs").glob("*.md"))
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?: \d{3}\b)*(?:\.\d+)?(?:e[-+]?\d+)?")
+
+# What a scene needs at least; examples that show a table or two are laid over it.
+LEAST = {"packing": "packings/n25_s1.csv", "walls": {"y_min": {"pressure": 1.0}, "y_max": {"pressure": 0.0}}}
+
+
+def blocks(page, *languages):
+    """(language, text) of each fenced block; all of them, or those in the languages given."""
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    return [block for block in found if not languages or block[0] in languages]
+
+
+def pages_with(*languages):
+    return [pytest.param(page, id=page.name) for page in PAGES if blocks(page, *languages)]
+
+
+@pytest.fixture
+def working_directory(tmp_path, monkeypatch):
+    """A copy of the data, to stand and write in."""
+    shutil.copytree(ROOT / "data", tmp_path / "data", ignore=shutil.ignore_patterns("results"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def assert_says(printed, expected):
+    """The same words; the same numbers up to rounding, times apart. A line of ... stands for any lines."""
+    lines = [line.rstrip() for line in printed.strip().splitlines()]
+    skipping = False
+    for line in expected.strip().splitlines():
+        if line.strip() == "...":
+            skipping = True
+            continue
+        while skipping and lines and not same(lines[0], line):
+            lines.pop(0)
+        skipping = False
+        assert lines, f"not printed: {line}"
+        assert same(lines[0], line), f"printed: {lines[0]}\nexpected: {line}"
+        lines.pop(0)
+    assert skipping or not lines, f"printed besides: {lines}"
+
+
+def same(printed, expected):
+    words = [re.sub(r"\d+\.\d+(?= s\b)", "T", text) for text in (printed, expected)]
+    numbers = [[float(x.replace(" ", "")) for x in NUMBER.findall(text)] for text in words]
+    texts = [" ".join(NUMBER.sub("#", text).split()) for text in words]
+    # Two per cent covers a last digit that rounds the other way; what is rounding itself need only be small.
+    return texts[0] == texts[1] and all(
+        a == pytest.approx(b, rel=0.02, abs=0.0) or max(abs(a), abs(b)) < 1e-10 for a, b in zip(*numbers, strict=True)
+    )
+
+
+@pytest.mark.parametrize("page", pages_with("python"))
+def test_python_runs_and_prints_what_the_page_says(page, working_directory):
+    (working_directory / "docs" / "img").mkdir(parents=True)
+    namespace = {"__name__": "__docs__"}
+    previous, printed = "", ""
+    for language, text in blocks(page):
+        if language == "python":
+            output = io.StringIO()
+            with contextlib.redirect_stdout(output):
+                exec(compile(text, str(page), "exec"), namespace)
+            printed = output.getvalue()
+        elif language == "text" and previous == "python":
+            assert_says(printed, text)
+        previous = language
+
+
+@pytest.mark.parametrize("page", pages_with("console"))
+def test_commands_print_what_the_page_says(page, working_directory, capsys):
+    """Blocks in `console`: lines that start with $ are commands, the others what they print."""
+    for _, text in blocks(page, "console"):
+        for command, _, expected in (part.partition("\n") for part in text.split("$ ")[1:]):
+            program, *arguments = shlex.split(command)
+            assert program == "porefv"
+            assert cli.main(arguments) == 0, capsys.readouterr().err
+            assert_says(capsys.readouterr().out, expected)
+
+
+@pytest.mark.parametrize("page", pages_with("toml"))
+def test_scenes_are_valid(page):
+    for _, text in blocks(page, "toml"):
+        FlowScene.from_mapping(LEAST | tomllib.loads(text), directory=ROOT / "data")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_relative_links_lead_somewhere(page):
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        goal = (page.parent / path).resolve() if path else page
+        assert goal.exists(), f"{page.name} links to {target}"
+        if anchor:
+            assert anchor in anchors(goal), f"{page.name} links to {target}"
+
+
+def anchors(page):
+    """The ids of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_continuous_integration_runs_the_command_of_the_readme():
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    commands = [text.strip() for _, text in blocks(ROOT / "README.md", "sh")]
+    assert any("pytest" in command and command in script for command in commands)
+    assert os.access(ROOT / ".ci" / "run", os.X_OK)
+
+
+def test_scene_reference_names_every_key():
+    page = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
+    readers = (flow_scene, shared_tables.read_packing_file, shared_tables.read_fluid, shared_tables.read_conductance)
+    source = "".join(map(inspect.getsource, readers))
+    known = re.findall(r"\.only\(([^)]*)\)", source)
+    keys = {key for names in known for key in re.findall(r'"(\w+)"', names)} - {"wall"}
+    assert len(keys) > 15
+    assert [key for key in sorted(keys) if f"`{key}`" not in page and f"`[{key}]`" not in page] == []

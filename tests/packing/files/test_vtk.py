@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from porefv.errors import InputError
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
+
+pyvista = pytest.importorskip("pyvista")
+
+CENTRES = np.array([[0.1, 0.2, 0.3], [0.7, 1 / 3, 0.5]])
+
+
+@pytest.fixture
+def points():
+    """Points with a radius and a box."""
+    mesh = pyvista.PolyData(CENTRES)
+    mesh.point_data["radius"] = [0.05, 0.1]
+    mesh.field_data["box_lower"] = [0.0, 0.0, 0.0]
+    mesh.field_data["box_upper"] = [1.0, 2.0, 3.0]
+    return mesh
+
+
+@pytest.mark.parametrize("extension", ["vtp", "vtk", "vtu"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_points_radii_and_box_are_read(tmp_path, points, extension, binary):
+    mesh = points.cast_to_unstructured_grid() if extension == "vtu" else points
+    mesh.save(tmp_path / f"a.{extension}", binary=binary)
+    packing = Packing.read(tmp_path / f"a.{extension}")
+    # ASCII files hold fewer digits than float64.
+    np.testing.assert_allclose(packing.centres, CENTRES, rtol=0 if binary else 1e-5)
+    np.testing.assert_allclose(packing.radii, [0.05, 0.1], rtol=0 if binary else 1e-5)
+    np.testing.assert_array_equal(packing.box.upper, [1, 2, 3])
+
+
+@pytest.mark.parametrize("name, factor", [("radii", 1), ("Radius", 1), ("r", 1), ("Diameter", 0.5)])
+def test_names_of_radii_and_diameters(tmp_path, name, factor):
+    mesh = pyvista.PolyData(CENTRES.astype(np.float32))
+    mesh.point_data[name] = np.array([0.5, 1], dtype=np.float32)
+    mesh.point_data["id"] = [7, 8]
+    mesh.save(tmp_path / "a.vtp")
+    packing = Packing.read(tmp_path / "a.vtp")
+    np.testing.assert_array_equal(packing.radii, [0.5 * factor, 1 * factor])
+    assert packing.box is None and packing.centres.dtype == np.float64
+
+
+def test_a_file_written_by_meshio_is_read(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    mesh = meshio.Mesh(CENTRES, [("vertex", [[0], [1]])], point_data={"radius": np.array([0.05, 0.1])})
+    mesh.write(tmp_path / "a.vtu")
+    np.testing.assert_array_equal(Packing.read(tmp_path / "a.vtu").radii, [0.05, 0.1])
+
+
+def test_what_is_written_opens_in_pyvista_with_a_vertex_a_sphere(tmp_path):
+    Packing(CENTRES, [0.05, 0.1], Box([0, 0, 0], [1, 1, 1])).write(tmp_path / "a.vtp")
+    mesh = pyvista.read(tmp_path / "a.vtp")
+    assert mesh.n_verts == 2
+    np.testing.assert_array_equal(mesh["radius"], [0.05, 0.1])
+
+
+def test_a_packing_is_not_written_as_a_mesh(tmp_path):
+    with pytest.raises(InputError, match="extension .vtp"):
+        Packing(CENTRES, [0.05, 0.1]).write(tmp_path / "a.vtk")
+
+
+def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, points):
+    def error():
+        points.save(tmp_path / "a.vtp")
+        with pytest.raises(InputError) as caught:
+            Packing.read(tmp_path / "a.vtp")
+        return str(caught.value)
+
+    points.point_data["diameter"] = [0.1, 0.2]
+    assert "there are 2" in error()
+    del points.point_data["diameter"]
+    points.point_data["radius"] = [0.1, -0.1]
+    assert "sphere 1: radius -0.1" in error()
+    points.point_data["radius"] = np.ones((2, 3))
+    assert "must have one component" in error()
+    del points.point_data["radius"]
+    points.point_data["mass"] = [1, 2]
+    assert "there are 0. Point data: 'mass'" in error()
+    points.point_data["radius"] = [0.1, 0.1]
+    points.field_data["box_upper"] = [1.0, 0.0, 1.0]
+    assert "the box has size 0 m along y" in error()
+    del points.field_data["box_upper"]
+    assert "field data box_upper is missing" in error()
+
+
+@pytest.mark.parametrize("extension", ["vtp", "vtk", "vtu"])
+def test_a_damaged_file_is_refused_and_vtk_prints_nothing(tmp_path, points, extension, capfd, caplog):
+    mesh = points.cast_to_unstructured_grid() if extension == "vtu" else points
+    mesh.save(tmp_path / f"a.{extension}")
+    content = (tmp_path / f"a.{extension}").read_bytes()
+    for size in range(30, len(content) - 100, len(content) // 7):
+        (tmp_path / f"b.{extension}").write_bytes(content[:size])
+        with pytest.raises(InputError, match=f"b.{extension}") as caught:
+            Packing.read(tmp_path / f"b.{extension}")
+        assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "") and not caplog.records
+
+
+def test_another_data_set_is_refused(tmp_path):
+    pyvista.MultiBlock([pyvista.Sphere()]).save(tmp_path / "a.vtm")
+    with pytest.raises(InputError, match="a.vtm"):
+        Packing.read(tmp_path / "a.vtm", format="vtk")

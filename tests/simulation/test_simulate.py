@@ -1,0 +1,455 @@
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from porefv.cli.program import main
+from porefv.coupling.walls_in_time import PressureTable, SinePressure
+from porefv.dem.dem import DEM
+from porefv.errors import ComputationError, InputError, MissingExtraError
+from porefv.packing.box import WALLS
+from porefv.scenes import simulation_scene
+from porefv.scenes.simulation_scene import SimulationScene
+from porefv.simulation import measurements, series, simulate
+from porefv.simulation.measurements import layer_stresses
+from porefv.simulation.progress import RunState, SimulationProgress, duration
+from porefv.simulation.run_record import read_record
+from porefv.simulation.series import read_profiles, read_series
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = [ROOT / "data" / "scenes" / f"{name}.toml" for name in ("oedometer", "triaxial", "permeameter")]
+
+DRY = f"""\
+[packing]
+file = "{ROOT}/data/packings/n54_s1.csv"
+scale = 0.05
+[[stages]]
+name = "press"
+plates = {{ z_max = {{ stress = 5.0e3, top_speed = 0.01 }} }}
+damping = 0.2
+duration = 0.02
+"""
+WET = f"""\
+[packing]
+file = "{ROOT}/data/packings/n54_s1.csv"
+scale = 0.05
+[fluid]
+viscosity = 1.0
+[walls]
+z_min = {{ pressure = 0.0 }}
+lateral = {{ slip = true }}
+[[stages]]
+name = "prepare"
+fluid = false
+damping = 0.2
+plates = {{ z_max = {{ stress = 2.0e3, top_speed = 0.01 }} }}
+duration = 0.02
+[[stages]]
+name = "load"
+plates = {{ z_max = {{ stress = 6.0e3, top_speed = 0.1 }} }}
+duration = 0.02
+[output]
+profiles = 0.004
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A scene file to be written."""
+    return tmp_path / "scene.toml"
+
+
+def run(path, text, *options):
+    path.write_text(text)
+    assert main(["simulate", str(path), "--quiet", *options]) == 0
+    return path.parent / "results"
+
+
+def files(directory):
+    """Content of each file that must not depend on where a run was stopped; seconds are in the others."""
+    return {
+        str(file.relative_to(directory)): file.read_bytes()
+        for file in sorted(directory.rglob("*"))
+        if file.is_file() and file.suffix in (".csv", ".pvd", ".vtp", ".vtu")
+    }
+
+
+# ---- physics ----------
+
+
+def test_a_dry_run_has_nothing_of_the_fluid(path):
+    found = run(path, DRY)
+    rows = read_series(found)
+    assert not {"mean_pressure", "flux_z_min"} & set(rows.dtype.names)
+    assert rows["contact_stress_z_max"][-1] == pytest.approx(5e3, rel=0.02)
+    assert len(rows) == pytest.approx(200, rel=0.5)
+    assert rows["strain_z"][0] == 0.0 and rows["strain_z"][-1] > 0.0
+    assert not (found / "profiles.csv").exists()
+
+
+def test_load_goes_from_the_fluid_to_the_contacts_and_their_sum_is_the_total(path):
+    rows = read_series(run(path, WET))
+    wet = rows[rows["stage"] == 2]
+    assert np.isnan(rows["mean_pressure"][rows["stage"] == 1]).all()
+    assert wet["mean_pressure"].max() > 1e3 > 300.0 > wet["mean_pressure"][-1]
+    area = 0.05**2
+    # The plate's section along z does not change: forces and stresses differ by it alone.
+    assert wet["total_stress_z_max"] == pytest.approx(wet["contact_stress_z_max"] + wet["fluid_force_z_max"] / area)
+    assert wet["total_stress_z_max"][-1] == pytest.approx(6e3, rel=0.01)
+    assert wet["contact_stress_z_min"][-1] == pytest.approx(6e3, rel=0.1)
+
+
+def test_momentum_balances_and_what_the_box_loses_flows_out(path):
+    rows = read_series(run(path, WET.replace("[output]", "[coupling]\ntolerance = 1.0e-10\n[output]\nevery = 1.0e-9")))
+    wet = rows[rows["stage"] == 2]
+    assert wet["momentum_residual"].max() < 1e-12
+    assert wet["power_imbalance"].max() < 1e-6
+    places = np.append(rows["place_z_max"][rows["stage"] == 1][-1], wet["place_z_max"])
+    times = np.append(rows["time"][rows["stage"] == 1][-1], wet["time"])
+    loss = np.diff(places) / np.diff(times) * 0.05**2
+    flow = sum(wet[f"flux_{wall}"] for wall in WALLS)
+    assert np.abs(flow - loss).max() < 1e-9 * np.abs(loss).max()
+
+
+def test_the_effective_stress_of_layers_is_that_of_the_sample_and_the_pressure_falls_towards_the_drain(path):
+    text = WET.replace("duration = 0.02\n[output]", "duration = 0.004\n[output]")
+    profiles = read_profiles(run(path, text))
+    last = profiles[profiles["time"] == profiles["time"][-1]]
+    assert len(last) == 10 and last["upper"][-1] == pytest.approx(0.05, rel=0.01)
+    assert last["pressure"][0] < last["pressure"][4] < last["pressure"][-1]
+    assert last["effective_stress"][0] > last["effective_stress"][-2]
+    dem = SimulationScene.read(path).grains()
+    edges = np.linspace(dem.box.lower[2], dem.box.upper[2], 7)
+    assert layer_stresses(dem, 2, edges).mean() == pytest.approx(dem.stress[2, 2], rel=1e-12)
+
+
+def test_pressures_follow_their_pressure_history(path):
+    """A pressure that rises on one wall drives a flow that follows it, grains being too heavy and held."""
+    text = WET.replace("z_min = { pressure = 0.0 }", "z_min = { pressure = 0.0 }\nz_max = { pressure = 0.0 }")
+    text = text.replace("plates = { z_max = { stress = 6.0e3, top_speed = 0.1 } }\n", "plates = { z_max = {} }\n")
+    rise = "walls = { z_min = { pressure = { times = [0.0, 0.001], pressures = [0.0, 100.0] } } }\nduration = 0.002"
+    swing = "[[stages]]\nwalls = { z_min = { pressure = { mean = 100.0, amplitude = 50.0, period = 0.002 } } }\n"
+    text = text.replace("duration = 0.02\n[output]", f"{rise}\n{swing}duration = 0.002\n[output]\nevery = 1.0e-9")
+    rows = read_series(run(path, text))
+    # Power of the walls is pressure times flux: it tells the pressure, which is that of the middle of each step.
+    wet = rows[rows["stage"] >= 2]
+    wet = wet[np.abs(wet["flux_z_min"]) > 1e-12]
+    pressure = wet["power_boundary"] / wet["flux_z_min"]
+    found = json.loads((path.parent / "results" / "simulation.json").read_text())
+    begin, then = (span["begin"] for span in found["spans"][1:])
+    middle = wet["time"] - 0.5 * (wet["time"][-1] - wet["time"][-2])
+    rising = PressureTable((0.0, 0.001), (0.0, 100.0))
+    swinging = SinePressure(100.0, 50.0, 0.002)
+    expected = [
+        rising.at(t - begin) if stage == 2 else swinging.at(t - then)
+        for t, stage in zip(middle, wet["stage"], strict=True)
+    ]
+    assert pressure == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert 140.0 < max(expected) and min(expected) < 10.0
+
+
+def test_buoyancy_is_there_with_the_fluid_and_gone_without(path, monkeypatch):
+    seen = []
+    recorded = DEM.apply
+
+    def apply(dem, forces):
+        seen.append(np.array(forces)[:, 2].sum())
+        recorded(dem, forces)
+
+    monkeypatch.setattr("porefv.simulation.measurements.unbalanced", lambda dem, coupling: 0.0)
+    monkeypatch.setattr(DEM, "apply", apply)
+    text = "gravity = [0.0, 0.0, -10.0]\n" + WET.replace("duration = 0.02", "duration = 0.001")
+    run(path, text.replace("[output]", "[[stages]]\nfluid = false\nduration = 0.001\n[output]"))
+    dem = SimulationScene.read(path).grains()
+    assert seen == pytest.approx([1000.0 * 10.0 * dem.masses.sum() / 2600.0, 0.0])
+
+
+def test_a_stage_keeps_what_it_does_not_name(path):
+    text = DRY.replace("duration = 0.02", "duration = 0.001\n[[stages]]\nfriction_angle = 10.0\nduration = 0.001")
+    text += "[[stages]]\nplates = { z_max = {} }\nduration = 0.001\n"
+    made = []
+    original = SimulationScene.grains
+
+    def grains(self):
+        made.append(original(self))
+        return made[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SimulationScene, "grains", grains)
+        rows = read_series(run(path, text))
+    still = rows[rows["stage"] == 3]
+    moving = rows[rows["stage"] == 2]
+    assert np.ptp(moving["place_z_max"]) > 0.0 and np.ptp(still["place_z_max"]) == 0.0
+    assert made[0].material.friction_angle == 10.0 and made[0].plates["z_max"].stress is None
+
+
+def test_a_stage_ends_at_rest_or_says_why_not(path, capsys):
+    resting = DRY.replace("duration = 0.02", "rest = { unbalanced = 5.0e-3 }")
+    rows = read_series(run(path, resting))
+    assert rows["unbalanced"][-1] <= 5e-3
+    assert rows["contact_stress_z_max"][-1] == pytest.approx(5e3, rel=1e-2)
+    path.write_text(resting.replace("5.0e-3 }", "5.0e-3, limit = 1.0e-3 }"))
+    assert main(["simulate", str(path), "--force"]) == 1
+    said = capsys.readouterr().err
+    assert "stage 'press' does not come to rest" in said and "wall z_max presses with" in said
+    assert "there is no checkpoint yet" in said
+
+
+# ---- taken up again ----------
+
+
+def test_a_run_that_is_killed_goes_on_to_the_last_bit(path, tmp_path):
+    sine = "walls = { z_min = { pressure = { amplitude = 500.0, period = 0.004 } } }\nduration = 0.03\n[output]"
+    text = WET.replace("duration = 0.02\n[output]", sine) + "frames = 0.005\n[checkpoint]\nsteps = 100\n"
+    whole = run(path, text).rename(tmp_path / "whole")
+    command = [sys.executable, "-m", "porefv", "simulate", str(path), "--quiet", "--resume"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    process = subprocess.Popen(command, env=environment)
+    stopped = tmp_path / "results" / "simulation.json"
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline and process.poll() is None:
+        if stopped.exists() and (point := json.loads(stopped.read_text())["checkpoint"]):
+            if point["coupled"] and point["step"] > 500:
+                break
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert json.loads(stopped.read_text())["status"] == "running"
+    shutil.copyfile(stopped, tmp_path / "when_killed.json")
+    with (tmp_path / "results" / "series.csv").open("a") as file:
+        file.write("1,2,a row that was not finis")
+    subprocess.run(command, env=environment, check=True)
+    assert files(tmp_path / "results") == files(whole)
+    assert json.loads(stopped.read_text())["status"] == "complete"
+    assert len(list((tmp_path / "results").glob("checkpoint_*.npz"))) == 1
+
+
+@pytest.mark.parametrize(("error", "status"), [(KeyboardInterrupt(), 130), (ComputationError("it runs away"), 1)])
+def test_what_stops_leaves_the_series_and_says_how_to_go_on(path, capsys, monkeypatch, error, status):
+    path.write_text(WET + "[checkpoint]\nsteps = 100\n")
+    original = DEM.run
+    with monkeypatch.context() as patch:
+
+        def fail(dem, steps):
+            if dem.steps > 250:
+                raise error
+            original(dem, steps)
+
+        patch.setattr(DEM, "run", fail)
+        assert main(["simulate", str(path)]) == status
+    said = capsys.readouterr().err
+    assert f"go on from there with: porefv simulate {path} --resume" in said and "Traceback" not in said
+    assert len(read_series(path.parent / "results")) > 10
+    assert read_record(path.parent / "results").status == ("interrupted" if status == 130 else "failed")
+    assert main(["simulate", str(path), "--resume", "--quiet"]) == 0
+
+
+def test_an_interrupt_waits_for_a_checkpoint(path, monkeypatch, capsys):
+    path.write_text(DRY)
+    original = DEM.run
+    sent = []
+
+    def interrupted(dem, steps):
+        original(dem, steps)
+        if dem.steps > 150 and not sent:
+            sent.append(dem.steps)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(DEM, "run", interrupted)
+    assert main(["simulate", str(path)]) == 130
+    point = read_record(path.parent / "results").checkpoint
+    assert point.step >= sent[0]
+    assert main(["simulate", str(path), "--resume"]) == 0
+    assert "results in" in capsys.readouterr().out
+    after = files(path.parent / "results")
+    assert after == files(run(path, DRY, "--force"))
+
+
+def test_stages_may_be_added_and_nothing_else_changed(path, capsys):
+    found = run(path, DRY)
+    before = (found / "series.csv").read_bytes()
+    assert main(["simulate", str(path), "--resume", "--quiet"]) == 0  # it is complete
+    assert (found / "series.csv").read_bytes() == before
+    path.write_text(DRY.replace("stress = 5.0e3", "stress = 6.0e3"))
+    assert main(["simulate", str(path), "--resume"]) == 2
+    assert "differs from the one that the run in" in capsys.readouterr().err
+    run(path, DRY + "[[stages]]\nduration = 0.001\n", "--resume")
+    after = (found / "series.csv").read_bytes()
+    assert after.startswith(before) and len(after) > len(before)
+
+
+def test_results_are_replaced_by_force_only_and_other_files_never(path, capsys, monkeypatch):
+    found = run(path, DRY.replace("0.02", "0.001"))
+    (found / "notes.txt").write_text("mine")
+    with monkeypatch.context() as patch:
+        patch.setattr(SimulationScene, "grains", lambda self: pytest.fail("computed"))
+        assert main(["simulate", str(path)]) == 2
+    assert "Go on with them with --resume, replace them with --force" in capsys.readouterr().err
+    assert main(["simulate", str(path), "--force", "--resume"]) == 2
+    run(path, DRY.replace("0.02", "0.0005"), "--force")
+    assert (found / "notes.txt").read_text() == "mine"
+    (found / "simulation.json").unlink()
+    assert main(["simulate", str(path), "--force"]) == 2
+    assert "holds files that are not results of porefv simulate" in capsys.readouterr().err
+
+
+def test_parquet_is_missed_before_the_run(path, monkeypatch):
+    monkeypatch.setattr(series.importlib.util, "find_spec", lambda name: None)
+    path.write_text(DRY + "[output]\nparquet = true\n")
+    with pytest.raises(MissingExtraError, match="pip install pyarrow"):
+        simulate.run(SimulationScene.read(path))
+    assert not (path.parent / "results").exists()
+
+
+def test_parquet_has_what_the_series_has(path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    found = run(path, DRY + "[output]\nparquet = true\n")
+    table, rows = parquet.read_table(found / "series.parquet"), read_series(found)
+    assert tuple(table.column_names) == rows.dtype.names
+    assert np.array_equal(table["strain_z"].to_numpy(), rows["strain_z"])
+
+
+def test_frames_are_taken_at_the_times_asked(path):
+    pyvista = pytest.importorskip("pyvista")
+    found = run(path, WET + "frames = [0.0, 0.03]\n") / "frames"
+    step = next(int(name.stem.split("_")[1]) for name in found.glob("pores_*.vtu"))
+    assert sorted(name.name for name in found.glob("grains_*")) == ["grains_000000000.vtp", f"grains_{step:09d}.vtp"]
+    pores = pyvista.read(found / f"pores_{step:09d}.vtu")
+    assert pores["pressure"].max() > 0.0
+    times = [float(t) for t in re.findall(r'timestep="([^"]+)"', (found / "pores.pvd").read_text())]
+    assert times == pytest.approx([0.03], rel=1e-3)
+
+
+# ---- bad scenes ----------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ("duration = 0.02\n[output]", "duraton = 0.02\n[output]", 18, "[stages 2] unknown key 'duraton'; did you mean"),
+        ("damping = 0.2", "damping = 2.0", 12, "[stages 1] damping: must lie in [0, 1), not 2.0"),
+        ("fluid = false\n", "", 11, "damping: is for dry stages"),
+        ("top_speed = 0.1 }", "top_sped = 0.1 }", 17, "[stages 2.plates.z_max] unknown key 'top_sped'"),
+        (", top_speed = 0.1 }", "}", 17, "a wall with a stress needs a top_speed in m/s"),
+        ("{ z_max = { stress = 6.0e3, top_speed = 0.1 } }", "{ top = {} }", 17, "unknown wall 'top'"),
+        ("duration = 0.02\n[output]", "[output]", 15, "[stages 2] duration: missing"),
+        ("duration = 0.02\n[output]", "duration = 1\nrest = {}\n[output]", 18, "duration and rest exclude each other"),
+        (
+            "z_min = { pressure = 0.0 }",
+            "z_min = { pressure = {times = [0, 1], pressures = [1]} }",
+            7,
+            "as many pressures",
+        ),
+        (
+            "z_min = { pressure = 0.0 }",
+            "z_min = { pressure = {times = [1, 0], pressures = [1, 2]} }",
+            7,
+            "increasing times",
+        ),
+        (
+            "z_min = { pressure = 0.0 }",
+            "z_min = { pressure = { amplitude = 1, period = 0} }",
+            7,
+            "positive number of s",
+        ),
+        ("[fluid]\nviscosity = 1.0\n", "", 4, "[walls] is about the fluid, and there is none"),
+        ("profiles = 0.004", "profiles = [0.1, 0.1]", 20, "[output] profiles: expected increasing times in s"),
+        ("scale = 0.05", "scale = -1", 3, "[packing] scale: must be a positive number"),
+        ("[output]", "[coupling]\nscheme = 'fast'\n[output]", 20, "unknown scheme 'fast'"),
+        ("[output]", "[checkpoint]\nsteps = 1\nseconds = 1\n[output]", 21, "seconds and steps exclude each other"),
+        ('name = "load"', 'name = "prepare"', 10, "two stages are called 'prepare'"),
+    ],
+)
+def test_errors_name_the_file_the_line_and_the_key(path, capsys, old, new, line, said):
+    assert old in WET
+    path.write_text(WET.replace(old, new))
+    assert main(["simulate", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert f"scene.toml, line {line}: " in error
+    assert said in error
+    assert not (path.parent / "results").exists()
+
+
+def test_a_scene_needs_stages(path):
+    path.write_text(DRY.split("[[stages]]")[0])
+    with pytest.raises(InputError, match="stages: at least one is needed"):
+        SimulationScene.read(path)
+
+
+# ---- progress, pictures, examples, documentation ----------
+
+
+def test_the_terminal_shows_time_what_remains_energy_and_imbalance():
+    progress = SimulationProgress(("a stage",), quiet=True)
+    progress.show(RunState(0.1, 0.5, 1e-3, 1e-9, 1e-2))
+    progress.show(RunState(0.2, 0.5, 1e-3, 1e-9, 1e-2))
+    line = progress.line("consolidation", 3.0)
+    assert re.fullmatch(r"porefv: consolidation  0\.2 of 0\.5 s, \d+ s left  kinetic 1e-03  imbalance 1e-09", line)
+    assert len(line) < 80
+    progress.show(RunState(0.2, None, 1e-3, 1e-9, 1e-2))
+    assert "0.2 s, unbalanced 1e-02" in progress.line("rest", 3.0)
+    assert [duration(x) for x in (42.0, 200.0, 9000.0)] == ["42 s", "3 min", "2.5 h"]
+
+
+def test_plot_draws_series(path):
+    pytest.importorskip("matplotlib")
+    found = run(path, WET)
+    assert main(["plot", str(found), "--out", str(path.parent / "picture.png")]) == 0
+    assert (path.parent / "picture.png").read_bytes().startswith(b"\x89PNG")
+    from porefv.simulation.series_picture import series_picture
+
+    pressures, stresses, strains, profiles = series_picture(found).axes
+    rows = read_series(found)
+    assert np.array_equal(pressures.lines[0].get_ydata(), rows["mean_pressure"], equal_nan=True)
+    assert len(stresses.lines) >= 12 and len(strains.lines) >= 3 and len(profiles.lines) > 1
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.stem)
+def test_example_scenes_run(example, tmp_path):
+    """A twentieth of each timed stage; stages to rest as they are."""
+    data = tomllib.loads(example.read_text(encoding="utf-8"))
+    for stage in data["stages"]:
+        if "duration" in stage:
+            stage["duration"] /= 20.0
+    data["output"]["directory"] = str(tmp_path / "results")
+    found = read_series(simulate.run(SimulationScene.from_mapping(data, directory=example.parent)))
+    assert set(found["stage"]) == set(range(1, len(data["stages"]) + 1))
+    wet = found[~np.isnan(found["mean_pressure"])]
+    assert len(wet) > 1 and np.isfinite(wet["max_pressure"]).all()
+    assert wet["momentum_residual"].max() < 1e-10
+    if example.stem != "triaxial":
+        measured = read_record(tmp_path / "results").permeability
+        assert [entry["when"] for entry in measured] == ["before", "after"]
+        assert measured[1]["permeability"] < measured[0]["permeability"]
+
+
+def test_the_page_names_every_key_and_column_and_its_scenes_are_sound():
+    page = (ROOT / "docs" / "simulate.md").read_text(encoding="utf-8")
+    source = Path(simulation_scene.__file__).read_text(encoding="utf-8")
+    keys = {key for names in re.findall(r"\.only\(([^)]*)\)", source) for key in re.findall(r'"(\w+)"', names)} - {
+        "wall"
+    }
+    assert len(keys) > 40
+    assert [key for key in sorted(keys) if f"`{key}`" not in page and f"`[{key}]`" not in page] == []
+    columns = measurements.GRAIN_COLUMNS + measurements.FLUID_COLUMNS + measurements.PROFILE_COLUMNS
+    columns = {re.sub("|".join(f"_{wall}$" for wall in WALLS), "_WALL", column) for column in columns}
+    assert [column for column in sorted(columns) if f"`{column}`" not in page] == []
+    scenes = re.findall(r"^```ini\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert scenes
+    for text in scenes:
+        SimulationScene.from_mapping(tomllib.loads(text), directory=ROOT / "data" / "scenes")
+
+
+@pytest.mark.parametrize("name", ["oedometer", "triaxial", "permeameter", "pack_dense", "pack_settled"])
+def test_check_validates_every_kind_of_scene(name, capsys):
+    assert main(["check", str(ROOT / "data" / "scenes" / f"{name}.toml")]) == 0
+    assert "in a box of" in capsys.readouterr().out
