@@ -24,8 +24,9 @@ from voids import widest_pores, with_grain
 
 from porefv.conductance.effective_radius import EffectiveRadius
 from porefv.conductance.hydraulic_radius import HydraulicRadius
-from porefv.conductance.model import ConductanceModel
+from porefv.conductance.model import FORCE_SPLITS, ConductanceModel
 from porefv.conductance.section_friction.model import SectionFriction
+from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces
 from porefv.flow.pore_flow import PoreFlow
@@ -112,10 +113,10 @@ class Case:
 
     @cached_property
     def between_vertices(self) -> np.ndarray:
-        """(t,): throats of which no end has been drawn from its Laguerre vertex, where pressures were resolved."""
+        """(t,): throats whose pore centres are the Laguerre vertices, where pressures were resolved."""
         throats = self.mesh.throats
-        drawn = np.abs(throats.centres - self.mesh.local_vertices).max(axis=1) > 0.0
-        return ~drawn[self.mesh.facets.cells[throats.first_facets]].any(axis=1)
+        moved = np.abs(centres_of_pores(throats) - self.mesh.local_vertices).max(axis=1) > 0.0
+        return ~moved[self.mesh.facets.cells[throats.first_facets]].any(axis=1)
 
     @cached_property
     def walls_of_throats(self) -> np.ndarray:
@@ -306,7 +307,7 @@ def by_shape(found: list[Case]) -> None:
 
 
 def forces(out: Path | None) -> None:
-    """Errors of forces by the model's pressures and the resolved ones, drag shared by surface or by drag."""
+    """Errors of forces by the model's pressures and the resolved ones, with both force splits."""
     pressures = ("computed", "at vertices", "mean")
     print(f"{'':34}" + "".join(f"{by:^36}" for by in ("by surface", "by drag")) + "  wall's drag, by surface, by drag")
     print(f"{'':34}" + "".join(f"{title:>12}" for title in pressures) * 2)
@@ -320,8 +321,8 @@ def forces(out: Path | None) -> None:
         mean = reference.pore_pressure(mesh)
         at_vertex = np.where(np.isfinite(at_vertex), at_vertex, mean)
         line, walls = f"{case.name:34}", ""
-        for shares in ("surface", "drag"):
-            unit = facet_forces(mesh, reference.walls.slip, shares)
+        for split in FORCE_SPLITS:
+            unit = facet_forces(mesh, reference.walls.slip, split)
             computed = flow.acting_pressure
             for pressure in (computed, at_vertex, mean):
                 of_cell = np.where(np.isnan(held), pressure, held)[mesh.cell_pore]

@@ -29,8 +29,10 @@ from porefv.coupling.coupling import Coupling
 from porefv.coupling.end_correction import permeameter
 from porefv.dem import checkpoint
 from porefv.dem.dem import DEM
-from porefv.dem.generation import UniformSizes, grow
-from porefv.dem.material import Material, Plate
+from porefv.dem.growth import grow
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
+from porefv.dem.sizes import UniformSizes
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls

@@ -25,7 +25,7 @@ from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
 import porefv.coupling.coupling as coupled
 from porefv.coupling.coupling import Coupling
-from porefv.dem.material import Plate
+from porefv.dem.plate import Plate
 from porefv.errors import ComputationError
 from porefv.flow.fluid import Fluid
 

@@ -19,6 +19,7 @@ from scale import PACKINGS, TILES, mirrored
 from voids import widest_pores, with_grain
 
 from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.conductance.model import ConductanceModel
 from porefv.conductance.registry import AUTO, MODELS
 from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import PorefvError
@@ -300,14 +301,14 @@ def double_row(m: int) -> Packing:
     return Packing(np.concatenate([one, other]), np.full(2 * m, 0.3 / m), UNIT)
 
 
-class Spread:
+class Spread(ConductanceModel):
     """Conductances of section friction, times factors scattered over so many decades.
 
     The factor hangs on the throat alone, so that a copy in another order and of another size has the same.
     """
 
     name = "spread"
-    shares = "drag"
+    force_split = "drag"
 
     def __init__(self, decades: float):
         self.decades = decades

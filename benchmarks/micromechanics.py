@@ -21,7 +21,7 @@ from porefv.coupling.consolidation import terzaghi_pressure
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.micromechanics import grain_strains, grain_stresses, layer_means
 from porefv.dem.dem import DEM
-from porefv.dem.material import Plate
+from porefv.dem.plate import Plate
 from porefv.flow.fluid import Fluid
 from porefv.mesh.pore_mesh import PoreMesh
 

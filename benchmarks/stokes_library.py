@@ -18,8 +18,10 @@ import numpy as np
 from voids import widest_pores, with_grain
 
 from porefv.conductance.hydraulic_radius import HydraulicRadius
-from porefv.dem.generation import UniformSizes, cloud, grow
+from porefv.dem.growth import grow
 from porefv.dem.material import Material
+from porefv.dem.random_placement import cloud
+from porefv.dem.sizes import UniformSizes
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls

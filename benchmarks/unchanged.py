@@ -24,7 +24,8 @@ import numpy as np
 from porefv.conductance.registry import MODELS
 from porefv.coupling.coupling import Coupling
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh

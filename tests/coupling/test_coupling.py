@@ -13,7 +13,8 @@ from porefv.coupling import checkpoint
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.exchange import Exchange
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 from porefv.errors import InputError
 from porefv.flow.solid_pressure import solid_pressure_weights
 

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 from porefv import Fluid, Walls
 from porefv.coupling.coupling import Coupling
 from porefv.dem.dem import DEM
+from porefv.dem.grain_model import GrainModel
 from porefv.dem.material import Material
-from porefv.dem.protocol import GrainModel
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 

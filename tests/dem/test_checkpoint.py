@@ -9,7 +9,8 @@ import pytest
 from porefv import Box, ComputationError, InputError, Packing
 from porefv.dem import checkpoint
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 

@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose
 
 from porefv import Box, ComputationError, InputError, Packing
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 
 E = 1.0e6
 SMOOTH = Material(young=E, stiffness_ratio=0.0, friction_angle=0.0, density=1000.0)

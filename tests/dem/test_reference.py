@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 
 # n2000_s1 compressed along z between plates that start at 1500 Pa, the other walls fixed and smooth; E = 15 MPa,
 # k_s/k_n = 0.5, as Yade 2023.02a has it (TriaxialStressController on z, damping 0.3, unbalanced force below 2e-5):

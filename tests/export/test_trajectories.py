@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from porefv import Box, InputError, Packing
 from porefv.dem import checkpoint
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 from porefv.export.trajectories import Trajectory
 
 pyvista = pytest.importorskip("pyvista")
@@ -256,7 +257,7 @@ def test_a_file_in_place_of_the_directory_is_named(tmp_path):
 def test_vtk_is_loaded_by_those_who_write_frames_only():
     program = """
 import sys
-import porefv.dem.checkpoint, porefv.dem.protocol, porefv.export.trajectories
+import porefv.dem.checkpoint, porefv.dem.grain_model, porefv.export.trajectories
 print([name for name in ("pyvista", "vtkmodules") if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -10,7 +10,7 @@ from porefv.system.number_checks import ensure_finite
 
 
 def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarray, viscosity: float) -> np.ndarray:
-    """Conductance K of each throat, q = K (p_i - p_j), from K = g / L.
+    """Conductance K of each throat, q = K (p_i - p_j), from K = g / (μ L).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from porefv.mesh.throats import Throats
 
 @dataclass(frozen=True)
 class EffectiveRadius(ConductanceModel):
-    """C12 eq. 10 (Bryant and Blunt 1992): μ g = 2π r_eff⁴, r_eff = (r_eq + r_inscr) / 4.
+    """C12 eq. 10 (Bryant and Blunt 1992): g = 2π r_eff⁴, r_eff = (r_eq + r_inscr) / 4.
 
     r_eq is the radius of the disc of area A^f, r_inscr that of the circle in the facet's plane tangent to its
     spheres and walls. A wall of symmetry doubles the throat by its mirror image: the circle then stands on the wall,

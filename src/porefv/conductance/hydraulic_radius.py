@@ -15,7 +15,7 @@ from porefv.system.number_checks import LEAST, MOST, within_range
 
 @dataclass(frozen=True)
 class HydraulicRadius(ConductanceModel):
-    """C12 eq. 8-9: μ g = α A^f R_h², R_h = φ / Σγ.
+    """C12 eq. 8-9: g = α A^f R_h², R_h = φ / Σγ.
 
     Parameters
     ----------

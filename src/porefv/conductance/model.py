@@ -59,7 +59,7 @@ class ConductanceModel(ABC):
 
     @abstractmethod
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
-        """(t,): μ g of each throat [m⁴], such that q = g (p_i - p_j) / L.
+        """(t,): conductivity g of each throat [m⁴], such that q = g (p_i - p_j) / (μ L).
 
         `slip`, (6,) bool, marks the walls of symmetry. Values that are not positive mean a closed throat.
         """

@@ -18,9 +18,10 @@ from porefv.flow.pressure import held_pressures
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
 from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.direct import SparseFactor
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network, reached
-from porefv.solvers.solver import Solver, SparseFactor
+from porefv.solvers.solver import Solver
 from porefv.system.kernels import njit
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from porefv.conductance.registry import AUTO
 from porefv.coupling.coupled_pressure import CoupledPressure, Power
 from porefv.coupling.end_correction import end_corrected_conductances
 from porefv.coupling.exchange import EXCHANGES, Exchange
-from porefv.dem.protocol import GrainModel
+from porefv.dem.grain_model import GrainModel
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pressure import held_pressures

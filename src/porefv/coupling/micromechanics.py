@@ -17,7 +17,7 @@ from porefv.packing.box import WALL_AXES
 from porefv.system.kernels import njit, prange
 
 if TYPE_CHECKING:
-    from porefv.dem.state import Contacts
+    from porefv.dem.measurements import Contacts
     from porefv.mesh.pore_mesh import PoreMesh
 
 

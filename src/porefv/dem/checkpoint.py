@@ -17,7 +17,8 @@ import numpy as np
 
 from porefv import __version__
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
 from porefv.system.atomic_files import atomic_write
 

@@ -9,9 +9,10 @@ import numpy as np
 from numba import get_num_threads
 
 from porefv.dem.contacts import grain_contacts, wall_contacts
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.measurements import Contacts, Energies
 from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, advance, wall_excess
-from porefv.dem.state import Contacts, Energies
+from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES, WALLS, Box
 from porefv.packing.neighbours import neighbour_pairs

@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from porefv.dem.dem import DEM
-from porefv.dem.state import Contacts
+from porefv.dem.measurements import Contacts
 from porefv.errors import InputError, counted
 from porefv.export.vtk_datasets import spheres_polydata
 from porefv.export.vtk_files import attach, cell_array, vtk_data_model, vtk_points, write_xml

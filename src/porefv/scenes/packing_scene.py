@@ -11,8 +11,13 @@ import numpy as np
 
 from porefv import __version__
 from porefv.dem.dem import DEM
-from porefv.dem.generation import Grading, PackingState, UniformSizes, cloud, grow, mean_stress, settle
-from porefv.dem.material import Material, Plate
+from porefv.dem.growth import grow
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
+from porefv.dem.random_placement import cloud
+from porefv.dem.settling import settle
+from porefv.dem.sizes import Grading, UniformSizes
+from porefv.dem.strided_run import PackingState, mean_stress
 from porefv.errors import InputError, vector
 from porefv.export.vtk_files import vtk_data_model
 from porefv.packing.box import WALLS, Box
@@ -28,14 +33,14 @@ _WRITTEN = ("csv", "yade", "vtk")  # formats
 
 @dataclass(frozen=True)
 class Cloud:
-    """As the parameters of `porefv.dem.generation.cloud`."""
+    """As the parameters of `porefv.dem.cloud`."""
 
     porosity: float
 
 
 @dataclass(frozen=True)
 class Growth:
-    """As the parameters of `porefv.dem.generation.grow`."""
+    """As the parameters of `porefv.dem.grow`."""
 
     stress: float | None
     porosity: float | None

@@ -12,7 +12,8 @@ from porefv.coupling.coupling import SCHEMES
 from porefv.coupling.exchange import EXCHANGES
 from porefv.coupling.walls_in_time import ConstantPressure, PressureHistory, PressureTable, SinePressure, WallHistory
 from porefv.dem.dem import DEM
-from porefv.dem.material import Material, Plate
+from porefv.dem.material import Material
+from porefv.dem.plate import Plate
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.walls import Wall

@@ -16,7 +16,7 @@ from porefv.system.number_checks import LEAST, MOST, within_range
 
 @dataclass(frozen=True)
 class SectionFriction(ConductanceModel):
-    """Friction summed over the cross-sections of a throat: L / (μ g) = ∫ (c₁ P + 2 c₂ A / r) / (A² w) ds.
+    """Friction summed over the cross-sections of a throat: L / g = ∫ (c₁ P + 2 c₂ A / r) / (A² w) ds.
 
     A(s) and P(s) are a section's fluid area and wetted perimeter, w its opening, and r a mean radius of the spheres,
     ∛r² weighed by their angles. Fluid that passes with q / A on average and is at rest on the perimeter is sheared

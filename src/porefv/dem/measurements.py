@@ -1,4 +1,4 @@
-"""What a sample of grains has at a moment: contacts and energies."""
+"""What is measured of a sample of grains: its contacts and its energies."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv import Box, Packing
 from porefv.dem.dem import DEM
-from porefv.dem.material import Plate
-from porefv.dem.protocol import GrainModel
+from porefv.dem.grain_model import GrainModel
+from porefv.dem.plate import Plate
 from porefv.errors import InputError
 
 
