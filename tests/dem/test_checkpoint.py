@@ -306,3 +306,18 @@ def test_steps_must_be_whole_numbers(tmp_path, steps, every, name):
     with pytest.raises(InputError, match=f"{name} must be a whole number"):
         checkpoint.run_saving(assembly("sc8"), steps, tmp_path / "state.npz", every=every)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_state_of_version_1_is_loaded(tmp_path):
+    dem = assembly()
+    dem.run(100)
+    checkpoint.save(dem, tmp_path / "new.npz")
+    names = {
+        "grain_ranges": "shares", "wall_pairs": "rims", "wall_pair_ranges": "rim_shares",
+        "wall_pair_stiffness": "rim_stiffness", "wall_pair_shear": "rim_shear", "wall_pair_touching": "rim_touching",
+    }  # fmt: skip
+    with np.load(tmp_path / "new.npz") as file:
+        content = {names.get(name, name): file[name] for name in file.files}
+    header = json.loads(str(content["header"])) | {"version": 1}
+    np.savez(tmp_path / "old.npz", **(content | {"header": np.array(json.dumps(header))}))
+    assert differences(dem, checkpoint.load(tmp_path / "old.npz")) == []
