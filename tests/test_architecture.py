@@ -67,6 +67,35 @@ def test_imports_for_type_checkers_point_down_to_conveniences_only():
     assert down == []
 
 
+def names_of(module):
+    """Top-level names of a module of the package, submodules included."""
+    base = SOURCE.parent / module.replace(".", "/")
+    file = base.with_suffix(".py") if base.with_suffix(".py").exists() else base / "__init__.py"
+    names = {path.stem for path in base.glob("*")} if base.is_dir() else set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.ImportFrom | ast.Import):
+            names.update(alias.asname or alias.name for alias in node.names)
+    return names
+
+
+@pytest.mark.parametrize("folder", ["src", "tests", "benchmarks", "docs"])
+def test_what_is_imported_from_the_package_exists(folder):
+    # A linter takes what the package's __getattr__ gives for granted.
+    missing = [
+        f"{path.relative_to(ROOT)}:{node.lineno}: {node.module}.{alias.name}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("porefv.")
+        for alias in node.names
+        if alias.name not in names_of(node.module)
+    ]
+    assert missing == []
+
+
 def test_tests_use_no_private_names():
     private = re.compile(r"(?<!self)(?<!cls)\._(?!_)[a-z]\w*|import _[a-z]\w*")
     found = [

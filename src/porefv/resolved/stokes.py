@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv import memory
 from porefv.errors import ComputationError
 from porefv.packing.box import WALL_AXES, WALL_SENSES
 from porefv.resolved.fluid_mesh import FluidMesh
+from porefv.system.memory import available
 
 if TYPE_CHECKING:
     from porefv.system.progress import Progress
@@ -212,7 +212,7 @@ def solve_stokes(
 
 def _ensure_memory(elements: int, unknowns: int, progress: Progress) -> None:
     """State what is needed before it is taken; ComputationError if it is not there."""
-    need, have = required_memory(unknowns), memory.available()
+    need, have = required_memory(unknowns), available()
     stated = f"{elements} elements, {unknowns} unknowns, about {need / 2**30:.1f} GiB"
     if have is not None:
         stated += f" of {have / 2**30:.1f} GiB free"
