@@ -29,7 +29,6 @@ What most scripts need is reachable from here and loaded when first used::
     flow.permeability, flow.pressure, flow.forces.total
 """
 
-import os
 from typing import TYPE_CHECKING
 
 from porefv.system.lazy_exports import lazy_exports
@@ -55,9 +54,6 @@ if TYPE_CHECKING:
     from porefv.tessellation.triangulation import RegularTriangulation
 
 __version__ = "0.1.0"
-
-# With TBB, which numba would take first, every call of a parallel kernel is slower than the one before.
-os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
 _HOMES = {
     "Box": "porefv.packing.box",

@@ -1,6 +1,10 @@
-"""Every error porefv raises on purpose; the command line turns `exit_status` into its exit code."""
+"""Every error and warning of porefv; the command line turns `exit_status` of an error into its exit code."""
 
 from collections.abc import Iterable
+
+# How options are named in errors that Python and the command line both show.
+FORCE_OPTION = "force=True (--force on the command line)"
+RESUME_OPTION = "resume=True (--resume on the command line)"
 
 
 class PorefvError(Exception):
@@ -43,6 +47,14 @@ class MissingExtraError(InputError, ImportError):
             f"{self.purpose} needs the package {self.package}, which is not installed. "
             f"Install it with: pip install {self.package}"
         )
+
+
+class PorefvWarning(UserWarning):
+    """Base of all warnings of porefv."""
+
+
+class CompilationWarning(PorefvWarning):
+    """Compiled kernels cannot be kept: they are compiled anew in every process."""
 
 
 def vector(values: Iterable[float]) -> str:

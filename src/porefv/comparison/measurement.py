@@ -5,9 +5,6 @@ Each method is computed in a process of its own: its memory is that of no other.
 
 from __future__ import annotations
 
-import os
-import resource
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +14,7 @@ import numpy as np
 from porefv.comparison.methods import Method
 from porefv.conductance.registry import conductance_model
 from porefv.scenes.flow_scene import FlowScene
+from porefv.system.memory import peak_resident, resident
 
 
 @dataclass(frozen=True)
@@ -32,15 +30,15 @@ class MethodResult:
         Pressure and viscous forces on the spheres [N].
     seconds : float
         From the packing in memory to the forces.
-    memory : int
-        Most that the process held, less what it held before it began [B].
+    memory : float
+        Peak of what the process had in use, less what it had before; NaN where the system does not say [B].
     """
 
     method: Method
     permeability: float
     forces: np.ndarray
     seconds: float
-    memory: int
+    memory: float
 
 
 def measure(scene_file: Path, method: Method) -> MethodResult:
@@ -61,33 +59,24 @@ def measure(scene_file: Path, method: Method) -> MethodResult:
         return (flow.permeability if flow.walls.axis is not None else float("nan")), forces
 
     run()
-    before = _held()
+    before = resident()
     begin = time.perf_counter()
     permeability, forces = run()
-    return MethodResult(method, permeability, forces, time.perf_counter() - begin, max(_most_held() - before, 0))
+    return MethodResult(method, permeability, forces, time.perf_counter() - begin, _taken(before))
 
 
 def _resolve(scene: FlowScene, method: Method) -> MethodResult:
     from porefv.resolved.refinement import Options, stokes_reference
 
     mesh = scene.pore_mesh()
-    before = _held()
+    before = resident()
     begin = time.perf_counter()
     found = stokes_reference(mesh, scene.walls, scene.fluid.viscosity, Options(single=True))
     seconds = time.perf_counter() - begin
-    return MethodResult(method, found.permeability, found.values.sphere_total, seconds, _most_held() - before)
+    return MethodResult(method, found.permeability, found.values.sphere_total, seconds, _taken(before))
 
 
-def _most_held() -> int:
-    """Largest resident size of this process so far [B]."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
-
-
-def _held() -> int:
-    """Resident size of this process now [B]; the largest so far where the system does not say."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    except OSError:
-        return _most_held()
-    return pages * os.sysconf("SC_PAGE_SIZE")
+def _taken(before: int | None) -> float:
+    """Bytes that the process has taken at its peak since it had so many in use; NaN if that is not known."""
+    peak = peak_resident()
+    return float("nan") if before is None or peak is None else max(peak - before, 0)

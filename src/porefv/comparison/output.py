@@ -26,10 +26,14 @@ def table(found: MethodComparison) -> str:
             f"{result.method.name:{width}}  {result.permeability:>12.5g}  "
             f"{'-' if reference or np.isnan(permeability) else f'{100 * permeability:+.2g} %':>8}  "
             f"{'-' if reference else f'{100 * forces:.2g} %':>11}  {_time(result.seconds):>9}  "
-            f"{result.memory / 2**20:>5.0f} MB{'  *' if found.is_best(result) else ''}"
+            f"{_memory(result.memory):>8}{'  *' if found.is_best(result) else ''}"
         )
     lines.append(f"Errors are distances from {origin}. * No other method has better forces in less time.")
     return "\n".join(lines)
+
+
+def _memory(size: float) -> str:
+    return "-" if np.isnan(size) else f"{size / 2**20:.0f} MB"
 
 
 def _time(seconds: float) -> str:

@@ -13,9 +13,11 @@ A new model derives from it, and takes ten lines::
 
 from __future__ import annotations
 
+import difflib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 
@@ -57,6 +59,10 @@ class ConductanceModel(ABC):
     name: str
     force_split: ForceSplit = "surface"
 
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        _refuse_unknown_attributes(cls)
+
     @abstractmethod
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         """(t,): conductivity g of each throat [m⁴], such that q = g (p_i - p_j) / (μ L).
@@ -71,6 +77,26 @@ class ConductanceModel(ABC):
         the grains around a pore is nearer to that at the vertex.
         """
         return None
+
+
+def _refuse_unknown_attributes(model: type[ConductanceModel]) -> None:
+    """TypeError for an attribute of a class that is none of the model's: mistyped, it would be another physics."""
+    known = {name for name in (*vars(ConductanceModel), *ConductanceModel.__annotations__) if not name.startswith("_")}
+    own = {name: value for name, value in vars(model).items() if not name.startswith("_") and name not in known}
+    for name, value in own.items():
+        parameter = name in vars(model).get("__annotations__", {})
+        plain = not (callable(value) or isinstance(value, property | staticmethod | classmethod | cached_property))
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.7)
+        if (plain and not parameter) or near:
+            meant = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
+            raise TypeError(
+                f"{model.__name__}.{name} is no attribute of a conductance model; {meant} A parameter of the model "
+                "is a field with a type (of a dataclass); the name of anything else that is its own begins with an "
+                "underscore"
+            )
+    split = model.force_split
+    if split not in FORCE_SPLITS:
+        raise TypeError(f"{model.__name__}.force_split must be one of {', '.join(FORCE_SPLITS)}, not {split!r}")
 
 
 def ensure_model(model: ConductanceModel) -> ConductanceModel:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import InputError
+from porefv.export.cell_data import values_by_cell
 from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points
 from porefv.mesh.cell_mesh import CellMesh
 from porefv.mesh.polyhedra import polyhedra
@@ -51,21 +51,9 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
     grid.SetCells(vtk_array(solids.types), cells)
     data = {"pore": mesh.cell_pore} if isinstance(mesh, PoreMesh) else {}
     for name, values in cell_data.items():
-        data[name] = _by_cell(mesh, name, np.asarray(values))
+        data[name] = values_by_cell(mesh, name, np.asarray(values))
     attach(grid.GetCellData(), data)
     return grid
-
-
-def _by_cell(mesh: CellMesh, name: str, values: np.ndarray) -> np.ndarray:
-    """Values with a row per cell, from one per cell or per pore."""
-    if len(values) == mesh.n_cells:
-        return values
-    pores = ""
-    if isinstance(mesh, PoreMesh):
-        if len(values) == mesh.n_pores:
-            return values[mesh.cell_pore]
-        pores = f" or per pore ({mesh.n_pores})"
-    raise InputError(f"cell data {name!r} has {len(values)} rows: needed is one per cell ({mesh.n_cells}){pores}")
 
 
 def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:

@@ -179,11 +179,11 @@ class CellMesh:
 
     # ---- the mesh for others ------------------------------------------------------------------------------------
 
-    def to_meshio(self) -> meshio.Mesh:
-        """The cells as a `meshio.Mesh` of tetrahedra, wedges and hexahedra (see `porefv.export.to_meshio`)."""
+    def to_meshio(self, **cell_data: Any) -> meshio.Mesh:
+        """The cells as a `meshio.Mesh` with the given arrays (see `porefv.export.to_meshio`)."""
         from porefv.export.meshio_mesh import to_meshio
 
-        return to_meshio(self)
+        return to_meshio(self, **cell_data)
 
     def to_pyvista(self, **cell_data: Any) -> pyvista.UnstructuredGrid:
         """The cells as a `pyvista.UnstructuredGrid` with the given arrays (see `porefv.export.to_pyvista`)."""

@@ -18,7 +18,7 @@ from porefv.dem.random_placement import cloud
 from porefv.dem.settling import settle
 from porefv.dem.sizes import Grading, UniformSizes
 from porefv.dem.strided_run import PackingState, mean_stress
-from porefv.errors import InputError, vector
+from porefv.errors import FORCE_OPTION, InputError, vector
 from porefv.export.vtk_files import vtk_data_model
 from porefv.packing.box import WALLS, Box
 from porefv.packing.files.registry import EXTENSIONS, write_packing
@@ -201,7 +201,7 @@ def _check_target(path: Path, force: bool) -> None:
     if path.is_dir():
         raise InputError(f"cannot write {path}: it is a directory")
     if path.exists() and not force:
-        raise InputError(f"{path} exists. Choose another file, or add --force")
+        raise InputError(f"{path} exists. Choose another file, or replace it with {FORCE_OPTION}")
     if not (path.absolute().parent.is_dir() and os.access(path.absolute().parent, os.W_OK)):
         raise InputError(f"cannot write {path}: {path.parent} is not a directory that may be written to")
 

@@ -17,7 +17,7 @@ from porefv.coupling import checkpoint as coupled_checkpoint
 from porefv.coupling.coupling import Coupling
 from porefv.dem import checkpoint as dry_checkpoint
 from porefv.dem.dem import DEM
-from porefv.errors import InputError
+from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
 from porefv.simulation.series import PARQUET, PROFILES, SERIES
 from porefv.system.atomic_files import atomic_write
 
@@ -160,7 +160,7 @@ def read_record(directory: str | PathLike[str]) -> RunRecord:
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path} is damaged ({error}). Start the run anew, with --force") from None
+        raise InputError(f"{path} is damaged ({error}). Start the run anew, with {FORCE_OPTION}") from None
 
 
 # ---- the directory ----------------------------------------------------------------------------------------------
@@ -190,8 +190,8 @@ def check_directory(directory: Path, force: bool) -> None:
         raise InputError(f"{directory} holds files that are not results of porefv simulate. Choose another directory")
     if content and not force:
         raise InputError(
-            f"{directory} already holds results. Go on with them with --resume, replace them with --force, or choose "
-            "another directory"
+            f"{directory} already holds results. Go on with them with {RESUME_OPTION}, replace them with "
+            f"{FORCE_OPTION}, or choose another directory"
         )
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         raise InputError(f"cannot write {directory}: {existing} is not a directory that may be written to")

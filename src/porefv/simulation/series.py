@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.errors import InputError, MissingExtraError
+from porefv.errors import FORCE_OPTION, InputError, MissingExtraError
 from porefv.system.atomic_files import atomic_write
 
 SERIES, PROFILES, PARQUET = "series.csv", "profiles.csv", "series.parquet"
@@ -37,7 +37,9 @@ class Series:
                 self._file.flush()
             else:
                 if path.stat().st_size < size:
-                    raise InputError(f"{path} is shorter than at its checkpoint. Start the run anew, with --force")
+                    raise InputError(
+                        f"{path} is shorter than at its checkpoint. Start the run anew, with {FORCE_OPTION}"
+                    )
                 os.truncate(path, size)
                 self._file = path.open("a", encoding="utf-8", newline="\n")
         except OSError as error:

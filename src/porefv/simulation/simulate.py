@@ -16,7 +16,7 @@ import numpy as np
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.walls_in_time import WallHistories
 from porefv.dem.dem import DEM
-from porefv.errors import ComputationError, InputError
+from porefv.errors import FORCE_OPTION, ComputationError, InputError
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, Rest, SimulationScene, Stage
@@ -137,8 +137,8 @@ def _to_resume(scene: SimulationScene) -> RunRecord | None:
     if changed:
         raise InputError(
             f"{scene.path or 'the scene'} differs from the one that the run in {directory} was started with, in "
-            f"{changed[0]}. Only stages that have not begun may be changed; start the run anew with --force, or give "
-            "the changed scene another directory"
+            f"{changed[0]}. Only stages that have not begun may be changed; start the run anew with {FORCE_OPTION}, or "
+            "give the changed scene another directory"
         )
     return record
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 
-from porefv.errors import InputError
+from porefv.errors import FORCE_OPTION, InputError
 
 # A directory that holds this file is a results directory, and may be replaced by a new one.
 RESULTS_MARK = "summary.json"
@@ -101,7 +101,9 @@ def _check_directory(path: str | PathLike[str], target: Path, force: bool) -> No
     if content and RESULTS_MARK not in content:
         raise InputError(f"{path} holds files that are not results of porefv. Choose another directory.")
     if content and not force:
-        raise InputError(f"{path} already holds results. Choose another directory, or add --force.")
+        raise InputError(
+            f"{path} already holds results. Choose another directory, or replace them with {FORCE_OPTION}."
+        )
 
 
 def _swap(temporary: Path, target: Path) -> None:

@@ -1,7 +1,8 @@
 """numba's `njit` and `prange`, for kernels that are kept on disk where they can be, and compiled anew where not.
 
 numba alone gives up where no directory can be written to, or where the disk is full: a kernel that is compiled
-already need not fail because it cannot be kept. Kernels of other packages are left as they are.
+already need not fail because it cannot be kept. Only the cache of a kernel of this package is another one than
+numba's own; nothing of numba itself is changed.
 """
 
 from __future__ import annotations
@@ -11,10 +12,25 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import njit, prange
-from numba.core import caching, dispatcher
+import numba
+from numba import prange
+from numba.core import caching
+
+from porefv.errors import CompilationWarning
 
 __all__ = ["njit", "prange"]
+
+
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """`numba.njit` with the same options; with `cache` compiled kernels are kept on disk as long as there is room."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        kernel = numba.njit(**options)(function)
+        if cache and kernel is not function:  # as it is where compiling is disabled
+            kernel._cache = _cache_of(function)  # what numba's own option sets, to its own kind of cache
+        return kernel
+
+    return decorate
 
 
 class _Cache(caching.FunctionCache):
@@ -28,10 +44,8 @@ class _Cache(caching.FunctionCache):
             _warn(error.strerror or type(error).__name__)
 
 
-def _cache(function: Callable) -> caching._Cache:
+def _cache_of(function: Callable[..., Any]) -> caching._Cache:
     """The cache of a function that numba is to compile."""
-    if not function.__module__.startswith("porefv."):
-        return caching.FunctionCache(function)
     try:
         return _Cache(function)
     except RuntimeError:
@@ -45,8 +59,6 @@ def _warn(reason: str) -> None:
     warnings.warn(
         f"compiled kernels cannot be kept ({reason}): every process compiles anew, for a minute. "
         "Name a directory with room in the variable NUMBA_CACHE_DIR",
+        CompilationWarning,
         stacklevel=1,
     )
-
-
-dispatcher.FunctionCache = _cache  # type: ignore[attr-defined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -87,6 +88,25 @@ def _process(root: Path) -> Iterator[int]:
         limit, _ = resource.getrlimit(getattr(resource, name))
         if limit != resource.RLIM_INFINITY:
             yield max(0, limit - max(used[place], libraries + each * threads))
+
+
+def resident() -> int | None:
+    """Bytes of memory that this process has in use now, or the most so far; None where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return peak_resident()
+
+
+def peak_resident() -> int | None:
+    """The most bytes of memory that this process has had in use so far; None where the system does not say."""
+    try:
+        import resource
+    except ImportError:  # not POSIX
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
 def ensure_libraries() -> None:

@@ -57,9 +57,15 @@ def test_what_is_written_opens_in_pyvista_with_a_vertex_a_sphere(tmp_path):
     np.testing.assert_array_equal(mesh["radius"], [0.05, 0.1])
 
 
-def test_a_packing_is_not_written_as_a_mesh(tmp_path):
-    with pytest.raises(InputError, match="extension .vtp"):
-        Packing(CENTRES, [0.05, 0.1]).write(tmp_path / "a.vtk")
+@pytest.mark.parametrize("extension", ["vtp", "vtk", "vtu"])
+def test_what_is_written_is_read_back_to_the_bit(tmp_path, extension):
+    rng = np.random.default_rng(1)
+    packing = Packing(rng.random((20, 3)), 0.1 * rng.random(20) + 0.01, Box([0, -1, 0], [1, 1, 3]))
+    packing.write(tmp_path / f"a.{extension}")
+    again = Packing.read(tmp_path / f"a.{extension}")
+    np.testing.assert_array_equal(again.centres, packing.centres)
+    np.testing.assert_array_equal(again.radii, packing.radii)
+    np.testing.assert_array_equal(again.box.upper, [1, 1, 3])
 
 
 def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, points):

@@ -55,25 +55,40 @@ def read(path: AnyPath) -> Packing:
 
 
 def write(packing: Packing, path: AnyPath) -> None:
-    """Write points with point data ``radius``, and the box as field data, to a .vtp file."""
-    if Path(path).suffix != ".vtp":
-        raise InputError(f"{path}: a packing is written to the VTK format with the extension .vtp.")
+    """Write points with point data ``radius``, and the box as field data: .vtp, .vtu, or legacy .vtk (binary)."""
     points = load("pyvista", "Writing VTK files").PolyData(np.array(packing.centres))
     points.point_data["radius"] = np.array(packing.radii)
     if packing.box is not None:
         for name, corner in zip(_CORNERS, (packing.box.lower, packing.box.upper), strict=True):
             points.field_data[name] = np.array(corner)
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    # Into memory first: on a full disk VTK crashes, and Python with it.
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(points)
-    writer.SetDataModeToBinary()
-    writer.SetWriteToOutputString(True)
     with atomic_write(path) as temporary:
-        if not writer.Write():
-            raise OSError("VTK could not write the points")
-        temporary.write_text(writer.GetOutputString(), encoding="utf-8")
+        temporary.write_bytes(_serialised(points, Path(path).suffix.lower()))
+
+
+def _serialised(points: Any, suffix: str) -> bytes:
+    """The content of the file. Made in memory: on a full disk VTK crashes, and Python with it."""
+    writer: Any
+    if suffix == ".vtk":
+        from vtkmodules.vtkIOLegacy import vtkPolyDataWriter
+
+        writer = vtkPolyDataWriter()
+        writer.SetFileTypeToBinary()
+    elif suffix == ".vtu":
+        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+        writer, points = vtkXMLUnstructuredGridWriter(), points.cast_to_unstructured_grid()
+        writer.SetDataModeToBinary()
+    else:
+        from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+        writer = vtkXMLPolyDataWriter()
+        writer.SetDataModeToBinary()
+    writer.SetInputData(points)
+    writer.SetWriteToOutputString(True)
+    if not writer.Write():
+        raise OSError("VTK could not write the points")
+    content = writer.GetOutputStdString() if suffix == ".vtk" else writer.GetOutputString()
+    return content if isinstance(content, bytes) else content.encode()  # text, where its bytes happen to be UTF-8
 
 
 def _read_mesh(path: AnyPath) -> Any:
