@@ -45,8 +45,10 @@ if TYPE_CHECKING:
     from porefv.flow.forces import Forces, grain_forces
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
+    from porefv.flow.solid_pressure import acting_pressure
     from porefv.flow.walls import Wall, Walls
     from porefv.mesh.cell_mesh import CellMesh
+    from porefv.mesh.facets import Facets
     from porefv.mesh.pore_mesh import PoreMesh
     from porefv.mesh.throats import Throats
     from porefv.packing.box import WALLS, Box
@@ -61,6 +63,7 @@ _HOMES = {
     "ComputationError": "porefv.errors",
     "ConductanceModel": "porefv.conductance.model",
     "EffectiveRadius": "porefv.conductance.effective_radius",
+    "Facets": "porefv.mesh.facets",
     "Fluid": "porefv.flow.fluid",
     "Forces": "porefv.flow.forces",
     "HydraulicRadius": "porefv.conductance.hydraulic_radius",
@@ -76,16 +79,17 @@ _HOMES = {
     "WALLS": "porefv.packing.box",
     "Wall": "porefv.flow.walls",
     "Walls": "porefv.flow.walls",
+    "acting_pressure": "porefv.flow.solid_pressure",
     "fluxes": "porefv.flow.flux",
     "grain_forces": "porefv.flow.forces",
     "solve_pressure": "porefv.flow.pressure",
     "throat_conductances": "porefv.conductance.conductances",
 }
 __all__ = [
-    "Box", "CellMesh", "ComputationError", "ConductanceModel", "EffectiveRadius", "Fluid", "Forces",
+    "Box", "CellMesh", "ComputationError", "ConductanceModel", "EffectiveRadius", "Facets", "Fluid", "Forces",
     "HydraulicRadius", "InputError", "Packing", "PoreFlow", "PoreMesh", "PorefvError", "PressureField",
-    "RegularTriangulation", "SectionFriction", "Throats", "WALLS", "Wall", "Walls", "fluxes", "grain_forces",
-    "solve_pressure", "throat_conductances",
+    "RegularTriangulation", "SectionFriction", "Throats", "WALLS", "Wall", "Walls", "acting_pressure", "fluxes",
+    "grain_forces", "solve_pressure", "throat_conductances",
 ]  # fmt: skip
 __getattr__ = lazy_exports(__name__, _HOMES)
 

@@ -57,6 +57,10 @@ class CompilationWarning(PorefvWarning):
     """Compiled kernels cannot be kept: they are compiled anew in every process."""
 
 
+class ImbalanceWarning(PorefvWarning):
+    """A pressure that was found elsewhere leaves more of the flow out of balance than rounding explains."""
+
+
 def vector(values: Iterable[float]) -> str:
     """Coordinates as shown in an error: ``0.5, 1, 0.25``."""
     return ", ".join(f"{value:.9g}" for value in values)

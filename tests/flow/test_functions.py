@@ -7,13 +7,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from porefv import results
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.conductance.model import ConductanceModel
 from porefv.conductance.registry import MODELS
-from porefv.errors import InputError
+from porefv.errors import ImbalanceWarning, InputError
 from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
 from porefv.flow.forces import grain_forces
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import solve_pressure
-from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.solid_pressure import acting_pressure
 from porefv.flow.walls import Wall, Walls
 
 
@@ -24,13 +25,15 @@ def test_functions_in_turn_are_the_flow(mesh_of, model, walls):
     flow = PoreFlow(mesh, walls, conductance=model)
     conductances = throat_conductances(mesh, model, walls.slip, flow.fluid.viscosity)
     field = solve_pressure(mesh, conductances, walls)
-    held = ~np.isnan(flow.imposed_pressures)
-    weights = solid_pressure_weights(mesh, model, conductances, walls.slip, held)
-    acting = field.pressure if weights is None else weights.interpolate(field.pressure)
+    acting = acting_pressure(mesh, model, conductances, walls, field)
     flux = fluxes(mesh, conductances, field)
     assert_array_equal(field.pressure, flow.pressure)
     assert_array_equal(flux, flow.flux)
-    assert_allclose(grain_forces(mesh, acting, walls, model.force_split).total, flow.forces.total, atol=1e-13)
+    forces = grain_forces(mesh, acting, walls, model.force_split)
+    assert_array_equal(forces.total, flow.forces.total)
+    by_array = grain_forces(mesh, acting.pressure, walls, model.force_split)
+    assert_allclose(by_array.total, forces.total, atol=1e-13)
+    assert_allclose(fluxes(mesh, conductances, field.pressure), flux, atol=1e-12 * abs(flux).max())
     into = wall_face_fluxes(mesh, net_outflows(mesh, flux), walls.held)
     assert_allclose(into[into > 0.0].sum(), flow.inflow, rtol=1e-13)
 
@@ -84,7 +87,8 @@ def test_the_imbalance_of_a_wrong_pressure_is_reported(mesh_of):
     place = np.zeros(mesh.n_pores)
     place[mesh.cell_pore] = 1.0 - mesh.vertices[:, 1]
     linear[free] = place[free]
-    flow = PoreFlow.from_pressure(mesh, linear, walls)
+    with pytest.warns(ImbalanceWarning, match="out of balance"):
+        flow = PoreFlow.from_pressure(mesh, linear, walls)
     assert flow.solver_report.imbalance > 0.1
     assert flow.forces.conservation_residual < 1e-12  # forces add up for any pressure
 
@@ -92,9 +96,9 @@ def test_the_imbalance_of_a_wrong_pressure_is_reported(mesh_of):
 def test_given_pressures_that_are_no_pressures_of_these_walls_are_refused(mesh_of):
     mesh, walls = mesh_of("n25_s1"), Walls.along("y")
     flow = PoreFlow(mesh, walls)
-    with pytest.raises(InputError, match="pressure must be 122 finite numbers"):
+    with pytest.raises(InputError, match=r"one value per pore, \(122,\), not shape \(121,\)"):
         PoreFlow.from_pressure(mesh, flow.pressure[:-1], walls)
-    with pytest.raises(InputError, match="pressure must be 122 finite numbers"):
+    with pytest.raises(InputError, match="must be finite: 122 pores have nan, pore 0 first"):
         PoreFlow.from_pressure(mesh, np.full(122, np.nan), walls)
     with pytest.raises(InputError, match=r"on walls of imposed pressure have another pressure.* instead of 1 Pa"):
         PoreFlow.from_pressure(mesh, 0.5 * flow.pressure, walls)
@@ -109,5 +113,49 @@ def test_a_model_that_does_not_derive_from_the_base_is_refused_with_the_remedy(m
 
     with pytest.raises(InputError, match=r"write class Slits\(ConductanceModel\)"):
         PoreFlow(mesh_of("n25_s1"), Walls.along("y"), conductance=Slits())
-    with pytest.raises(InputError, match=r"not HydraulicRadius"):
+    with pytest.raises(InputError, match=r"not a class: write HydraulicRadius\(\)"):
         PoreFlow(mesh_of("n25_s1"), Walls.along("y"), conductance=HydraulicRadius)
+    with pytest.raises(InputError, match=r"conductance_model\('hydraulic-radius'\)"):
+        PoreFlow(mesh_of("n25_s1"), Walls.along("y"), conductance="hydraulic-radius")
+
+
+def test_a_conductivity_of_another_shape_is_refused(mesh_of):
+    class One(ConductanceModel):
+        name = "one"
+
+        def conductivity(self, throats, slip):
+            return 1.0
+
+    with pytest.raises(InputError, match=r"model one must have one value per throat, \(240,\), not shape \(\)"):
+        _ = PoreFlow(mesh_of("n25_s1"), Walls.along("y"), conductance=One()).conductances
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_conductances_that_are_none_are_refused(mesh_of, value):
+    mesh = mesh_of("n25_s1")
+    conductances = np.ones(240)
+    conductances[7] = value
+    for function in (solve_pressure, lambda mesh, k, walls: fluxes(mesh, k, np.zeros(mesh.n_pores))):
+        with pytest.raises(InputError, match="1 throat are not, the first of them throat 7 with"):
+            function(mesh, conductances, Walls.along("y"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("packing.csv", Walls.along("y")), "mesh must be a PoreMesh or a Packing"),
+        ((None, Walls.along("y")), "mesh must be"),
+        ((0, {"y_min": 1.0}), "walls must be Walls"),
+        ((0, Walls.along("y"), 1e-3), "fluid must be a Fluid"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(mesh_of, arguments, said):
+    if arguments[0] == 0:
+        arguments = (mesh_of("n25_s1"), *arguments[1:])
+    with pytest.raises(InputError, match=said):
+        PoreFlow(*arguments)
+
+
+def test_a_number_is_no_wall():
+    with pytest.raises(InputError, match=r"y_min must be a Wall, such as Wall\(pressure=1.0\), not 1.0"):
+        Walls(y_min=1.0)

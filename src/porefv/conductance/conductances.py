@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from porefv.conductance.model import ConductanceModel, ensure_model
+from porefv.errors import InputError, counted
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.system.number_checks import ensure_finite
+from porefv.system.number_checks import check_number, ensure_finite
 
 
 def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarray, viscosity: float) -> np.ndarray:
@@ -28,13 +30,37 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
 
     Raises
     ------
+    InputError
+        If the model is no `ConductanceModel`, or gives an array of another shape; if the viscosity is not positive.
     ComputationError
         If a conductance is not a finite number.
     """
-    throats = mesh.throats
-    conductivity = ensure_model(model).conductivity(throats, slip)
+    throats, slip = mesh.throats, np.asarray(slip, bool)
+    check_number(viscosity, "viscosity", "a positive number of Pa s", lambda x: x > 0.0)
+    conductivity = np.asarray(ensure_model(model).conductivity(throats, slip), float)
+    if conductivity.shape != (len(throats),):
+        raise InputError(
+            f"the conductivity of the model {model.name} must have one value per throat, ({len(throats)},), not shape "
+            f"{conductivity.shape}"
+        )
     lengths = viscosity * throats.effective_lengths
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
         conductances = np.divide(conductivity, lengths, out=lengths)
     conductances[(conductivity <= 0.0) | throats.closed] = 0.0
     return ensure_finite(conductances, f"conductances of {model.name}")
+
+
+def check_conductances(mesh: PoreMesh, conductances: ArrayLike) -> np.ndarray:
+    """(t,) float array of conductances; InputError if the shape is another, or a value is negative or not finite."""
+    found = np.asarray(conductances, float)
+    if found.shape != (len(mesh.throats),):
+        raise InputError(
+            f"conductances must have one value per throat, ({len(mesh.throats)},), not shape {found.shape}"
+        )
+    wrong = np.flatnonzero(~((found >= 0.0) & np.isfinite(found)))
+    if len(wrong):
+        raise InputError(
+            f"conductances must be finite and not negative: {counted(len(wrong), 'throat')} are not, the first of them "
+            f"throat {wrong[0]} with {found[wrong[0]]:g} m³/(Pa s); zero closes a throat"
+        )
+    return found

@@ -101,10 +101,18 @@ def _refuse_unknown_attributes(model: type[ConductanceModel]) -> None:
 
 def ensure_model(model: ConductanceModel) -> ConductanceModel:
     """The model; InputError if it is not a ConductanceModel."""
+    if isinstance(model, str):
+        raise InputError(
+            f"conductance must be a ConductanceModel, not a text: use porefv.conductance.conductance_model({model!r})"
+        )
+    if isinstance(model, type):
+        raise InputError(f"conductance must be an object, not a class: write {model.__name__}()")
     if not isinstance(model, ConductanceModel):
-        given = model.__name__ if isinstance(model, type) else type(model).__name__
+        given = type(model).__name__
         raise InputError(
             f"conductance must be an object of a class that derives from porefv.ConductanceModel, not {given}: "
             f"write class {given}(ConductanceModel), with a name and a method conductivity(throats, slip)"
         )
+    if not isinstance(getattr(model, "name", None), str):
+        raise InputError(f"the conductance model {type(model).__name__} has no name; give the class one, a text")
     return model

@@ -5,11 +5,11 @@ from porefv.flow.flux import fluxes
 from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import PressureField, solve_pressure
-from porefv.flow.solid_pressure import SolidPressureWeights, solid_pressure_weights
+from porefv.flow.solid_pressure import SolidPressureWeights, acting_pressure, solid_pressure_weights
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Wall, Walls
 
 __all__ = [
-    "Fluid", "Forces", "PoreFlow", "PressureField", "SolidPressureWeights", "Wall", "Walls", "fluxes", "grain_forces",
-    "pore_velocities", "solid_pressure_weights", "solve_pressure",
+    "Fluid", "Forces", "PoreFlow", "PressureField", "SolidPressureWeights", "Wall", "Walls", "acting_pressure",
+    "fluxes", "grain_forces", "pore_velocities", "solid_pressure_weights", "solve_pressure",
 ]  # fmt: skip

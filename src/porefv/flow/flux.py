@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.flow.pressure import PressureField
+from porefv.conductance.conductances import check_conductances
+from porefv.flow.pressure import PressureField, as_field
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.system.number_checks import ensure_finite
 
 
-def fluxes(mesh: PoreMesh, conductances: np.ndarray, field: PressureField) -> np.ndarray:
+def fluxes(mesh: PoreMesh, conductances: np.ndarray, pressure: PressureField | np.ndarray) -> np.ndarray:
     """q = K (p_i - p_j) of each throat.
 
     Parameters
@@ -17,7 +18,8 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, field: PressureField) -> np
     mesh : PoreMesh
     conductances : (t,) array
         K of each throat [m³/(Pa s)].
-    field : PressureField
+    pressure : PressureField, or (n_pores,) array
+        Piezometric pressure of each pore [Pa].
 
     Returns
     -------
@@ -26,10 +28,13 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, field: PressureField) -> np
 
     Raises
     ------
+    InputError
+        For arrays of the wrong shape, or with values that are not allowed.
     ComputationError
         If a flux is not a finite number.
     """
-    return ensure_finite(conductances * field.drops(mesh.throats.pores), "fluxes")
+    drops = as_field(mesh, pressure).drops(mesh.throats.pores)
+    return ensure_finite(check_conductances(mesh, conductances) * drops, "fluxes")
 
 
 def net_outflows(mesh: PoreMesh, flux: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from porefv.conductance.model import FORCE_SPLITS, ForceSplit
 from porefv.errors import InputError
+from porefv.flow.pressure import PressureField, as_field
 from porefv.flow.pressure_along_throats import apply_pressure_along_throats
 from porefv.flow.walls import Walls
 from porefv.mesh.facet_kernels import row_sums
@@ -84,11 +85,10 @@ class Forces:
 
 def grain_forces(
     mesh: PoreMesh,
-    pressure: np.ndarray,
+    pressure: PressureField | np.ndarray,
     walls: Walls,
     split: ForceSplit = "surface",
     *,
-    reference: float = 0.0,
     weight: np.ndarray | None = None,
 ) -> Forces:
     """Forces on spheres and walls due to a piezometric pressure field and the weight of the fluid.
@@ -96,9 +96,9 @@ def grain_forces(
     Parameters
     ----------
     mesh : PoreMesh
-    pressure : (n_pores,) array
-        Piezometric pressure that acts on the grains of each pore, less the reference [Pa]: the pressure of the pore, or
-        what `solid_pressure_weights` make of it.
+    pressure : PressureField, or (n_pores,) array
+        Piezometric pressure that acts on the grains of each pore [Pa]: for a model with pore centres, such as section
+        friction, what `acting_pressure` gives; else the pressure of the pores.
     walls : Walls
         Which walls have a pressure, and which do not drag the fluid.
     split : {'surface', 'drag'}
@@ -107,8 +107,6 @@ def grain_forces(
         throat (`porefv.flow.pressure_along_throats`), and drag is divided by γ^k times the shear on it. That shear
         varies as 1 / r on a sphere with much room around it, as in Stokes' law; on walls it is multiplied by the
         roundness λ of the constriction, because of the cusps along them.
-    reference : float
-        Pressure that all pores have in addition [Pa]: it acts on the walls only.
     weight : (3,) array, optional
         Weight of a unit volume of fluid, ρ g [N/m³].
 
@@ -119,14 +117,14 @@ def grain_forces(
     Raises
     ------
     InputError
-        For an unknown split, or pressures of the wrong shape.
+        For an unknown split, or pressures of the wrong shape or not finite.
     """
-    if np.shape(pressure) != (mesh.n_pores,):
-        raise InputError(f"pressure must have one value per pore, ({mesh.n_pores},), not shape {np.shape(pressure)}")
+    field = as_field(mesh, pressure)
+    relative, reference = field.relative, field.reference
     n = mesh.n_spheres
     on_spheres_p = np.zeros((n + 6, 3))
     on_spheres_v = np.zeros((n + 6, 3))
-    cell_pressure = pressure[mesh.cell_pore]
+    cell_pressure = relative[mesh.cell_pore]
     drops = cell_pressure[mesh.facets.cells[:, 0]] - cell_pressure[mesh.facets.cells[:, 1]]
     for rows, by_pressure, by_drag in _unit_forces(mesh, walls.slip, split):
         _scatter(mesh.facets.vertices[rows], drops[rows], by_pressure, by_drag, on_spheres_p, on_spheres_v)
@@ -148,7 +146,7 @@ def grain_forces(
 
     volumes = 4.0 / 3.0 * np.pi * mesh.packing.radii**3
     weight = np.zeros(3) if weight is None else np.asarray(weight, float)
-    spread = float(np.ptp(pressure)) or float(np.abs(pressure + reference).max()) or 1.0
+    spread = float(np.ptp(relative)) or float(np.abs(field.pressure).max()) or 1.0
     return Forces(
         pressure=on_spheres_p[:n],
         viscous=on_spheres_v[:n],

@@ -1,7 +1,7 @@
 """PoreFlow: steady viscous flow through the pores of a fixed packing, each quantity computed when asked for.
 
 The functions that it calls can be used without it: `throat_conductances`, `solve_pressure`, `fluxes`,
-`solid_pressure_weights`, `grain_forces`, `pore_velocities`.
+`acting_pressure`, `grain_forces`, `pore_velocities`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 from functools import cached_property
+from types import NoneType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,7 @@ from porefv.flow.pressure import (
     reference_pressure,
     solve_pressure,
 )
-from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.solid_pressure import acting_pressure
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
@@ -79,6 +80,13 @@ class PoreFlow:
         solver: str = "auto",
         tolerance: float = TOLERANCE,
     ):
+        for given, kinds, what in (
+            (mesh, (PoreMesh, Packing), "mesh must be a PoreMesh or a Packing (Packing.read reads a file)"),
+            (walls, Walls, "walls must be Walls, such as Walls.along('y')"),
+            (fluid, (Fluid, NoneType), "fluid must be a Fluid, such as Fluid(viscosity=1e-3)"),
+        ):
+            if not isinstance(given, kinds):
+                raise InputError(f"{what}, not {given!r}")
         self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()
@@ -97,7 +105,7 @@ class PoreFlow:
     @classmethod
     def from_pressure(
         cls,
-        mesh: PoreMesh,
+        mesh: PoreMesh | Packing,
         pressure: np.ndarray,
         walls: Walls,
         fluid: Fluid | None = None,
@@ -109,12 +117,17 @@ class PoreFlow:
 
         Parameters
         ----------
-        mesh : PoreMesh
+        mesh : PoreMesh or Packing
         pressure : (n_pores,) array
             Piezometric pressure of each pore [Pa]. Pores on walls of imposed pressure must have that pressure, to
             1e-6 of the range of the pressures.
         walls, fluid, conductance, gravity
-            As of `PoreFlow`.
+            As of `PoreFlow`: those with which the pressure was found.
+
+        Warns
+        -----
+        ImbalanceWarning
+            If the pressure leaves more than 1e-3 of the flow out of balance.
 
         Raises
         ------
@@ -127,7 +140,7 @@ class PoreFlow:
         >>> other.forces.total  # doctest: +SKIP
         """
         flow = cls(mesh, walls, fluid, conductance, gravity=gravity)
-        flow._given = given_pressure(mesh, flow.conductances, np.asarray(pressure, float), walls)
+        flow._given = given_pressure(flow.mesh, flow.conductances, pressure, walls)
         return flow
 
     # ---- pressure -----------------------------------------------------------------------------------------------
@@ -171,16 +184,13 @@ class PoreFlow:
         return self.solution.pressure
 
     @cached_property
-    def _acting_pressure(self) -> np.ndarray:
-        held = ~np.isnan(self._held)
-        weights = solid_pressure_weights(self.mesh, self.conductance, self.conductances, self.walls.slip, held)
-        relative = self.solution.relative
-        return relative if weights is None else weights.interpolate(relative)
+    def _acting(self) -> PressureField:
+        return acting_pressure(self.mesh, self.conductance, self.conductances, self.walls, self.solution)
 
     @property
     def acting_pressure(self) -> np.ndarray:
-        """(n_pores,): piezometric pressure that acts on the grains of each pore (`flow.solid_pressure`) [Pa]."""
-        return self._acting_pressure + self._reference
+        """(n_pores,): piezometric pressure that acts on the grains of each pore (`flow.acting_pressure`) [Pa]."""
+        return self._acting.pressure
 
     @property
     def cell_pressure(self) -> np.ndarray:
@@ -288,10 +298,9 @@ class PoreFlow:
         with self._timed("forces"):
             forces = grain_forces(
                 self.mesh,
-                self._acting_pressure,
+                self._acting,
                 self.walls,
                 self.conductance.force_split,
-                reference=self._reference,
                 weight=self.fluid.density * self.gravity,
             )
             ensure_finite(forces.total, "forces")

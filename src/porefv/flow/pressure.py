@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from porefv.errors import InputError, counted
+from porefv.conductance.conductances import check_conductances
+from porefv.errors import ImbalanceWarning, InputError, counted
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.pressure_equation import reached, solve_network
@@ -14,6 +17,8 @@ from porefv.solvers.solver import TOLERANCE, SolverReport
 
 # How far a given pressure may be from the imposed one of its pore, relative to the range of the pressures.
 GIVEN_TOLERANCE = 1e-6
+# Imbalance of a given pressure, relative to the flow, up to which no warning is given.
+BALANCED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,35 @@ class PressureField:
         """(t,): fall of pressure from the first to the second pore of each pair (t, 2) [Pa]."""
         i, j = pairs.T
         return (self.relative[i] - self.relative[j]) + (self.remainder[i] - self.remainder[j])
+
+
+def as_field(mesh: PoreMesh, pressure: PressureField | np.ndarray) -> PressureField:
+    """The field; an array (n_pores,) of pressures [Pa] as a field without a reference.
+
+    Raises
+    ------
+    InputError
+        For an array of the wrong shape, or with values that are not finite.
+    """
+    if isinstance(pressure, PressureField):
+        return pressure
+    values = check_by_pore(mesh, pressure)
+    n = mesh.n_pores
+    report = SolverReport("given", n, 0, 0.0, float("nan"), 0.0, 0.0)
+    return PressureField(0.0, values, np.zeros(n), np.zeros(n, bool), report)
+
+
+def check_by_pore(mesh: PoreMesh, values: ArrayLike, what: str = "pressure") -> np.ndarray:
+    """(n_pores,) float array; InputError if the shape is another, or a value is not finite."""
+    found = np.asarray(values, float)
+    if found.shape != (mesh.n_pores,):
+        raise InputError(f"{what} must have one value per pore, ({mesh.n_pores},), not shape {found.shape}")
+    if not np.isfinite(found).all():
+        bad = np.flatnonzero(~np.isfinite(found))
+        raise InputError(
+            f"{what} must be finite: {counted(len(bad), 'pore')} have {found[bad[0]]}, pore {bad[0]} first"
+        )
+    return found
 
 
 def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
@@ -127,12 +161,9 @@ def solve_pressure(
     >>> solve_pressure(mesh, conductances, walls).pressure.max()  # doctest: +SKIP
     1.0
     """
-    if np.shape(conductances) != (len(mesh.throats),):
-        raise InputError(
-            f"conductances must have one value per throat, ({len(mesh.throats)},), not shape {np.shape(conductances)}"
-        )
-    if sources is not None and np.shape(sources) != (mesh.n_pores,):
-        raise InputError(f"sources must have one value per pore, ({mesh.n_pores},), not shape {np.shape(sources)}")
+    conductances = check_conductances(mesh, conductances)
+    if sources is not None:
+        sources = check_by_pore(mesh, sources, "sources")
     reference = reference_pressure(walls)
     found = solve_network(
         mesh.throats.pores,
@@ -163,8 +194,7 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     InputError
         For pressures of the wrong shape, not finite, or other than those imposed.
     """
-    if pressure.shape != (mesh.n_pores,) or not np.isfinite(pressure).all():
-        raise InputError(f"pressure must be {mesh.n_pores} finite numbers, one per pore, not {pressure.shape}")
+    pressure = check_by_pore(mesh, pressure)
     reference = reference_pressure(walls)
     imposed = held_pressures(mesh, walls.pressures)
     free = np.isnan(imposed)
@@ -183,5 +213,12 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     outflow = np.bincount(i, flux, mesh.n_pores) - np.bincount(j, flux, mesh.n_pores)
     lost, through = float(np.abs(outflow[free]).sum()), 0.5 * float(np.abs(outflow[~free]).sum())
     imbalance = lost / through if through > 0.0 else lost
+    if imbalance > BALANCED:
+        warnings.warn(
+            f"the given pressure leaves {imbalance:.1e} of the flow out of balance: was it found with other "
+            "conductances than those of this flow?",
+            ImbalanceWarning,
+            stacklevel=3,
+        )
     report = SolverReport("given", int(np.count_nonzero(free)), 0, 0.0, imbalance, 0.0, 0.0)
     return PressureField(reference, relative, np.zeros(mesh.n_pores), ~reached(pairs, conductances, ~free), report)

@@ -7,11 +7,13 @@ part of the pressure drop that is lost between the vertex and the centre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from porefv.conductance.model import ConductanceModel
+from porefv.flow.pressure import PressureField, as_field, held_pressures
+from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 
 # Where between the centre of a pore and its Laguerre vertex the pressure is that acts on the grains: fitted to the
@@ -67,3 +69,31 @@ def solid_pressure_weights(
         return None
     sums = np.bincount(pores.ravel(), weights.ravel(), mesh.n_pores)
     return SolidPressureWeights(pores, weights / np.maximum(sums, 1.0)[pores])
+
+
+def acting_pressure(
+    mesh: PoreMesh,
+    model: ConductanceModel,
+    conductances: np.ndarray,
+    walls: Walls,
+    pressure: PressureField | np.ndarray,
+) -> PressureField:
+    """The pressure that acts on the grains of each pore, from the pressures of the pores.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    model : ConductanceModel
+        The model that gave the conductances.
+    conductances : (t,) array
+        K of each throat [m³/(Pa s)].
+    walls : Walls
+    pressure : PressureField, or (n_pores,) array
+        Piezometric pressure of each pore [Pa].
+    """
+    field = as_field(mesh, pressure)
+    held = ~np.isnan(held_pressures(mesh, walls.pressures))
+    weights = solid_pressure_weights(mesh, model, conductances, walls.slip, held)
+    if weights is None:
+        return field
+    return replace(field, relative=weights.interpolate(field.relative), remainder=np.zeros(mesh.n_pores))

@@ -60,6 +60,11 @@ class Walls:
     z_min: Wall = field(default_factory=Wall)
     z_max: Wall = field(default_factory=Wall)
 
+    def __post_init__(self) -> None:
+        for name in WALLS:
+            if not isinstance(getattr(self, name), Wall):
+                raise InputError(f"{name} must be a Wall, such as Wall(pressure=1.0), not {getattr(self, name)!r}")
+
     @classmethod
     def along(cls, axis: str = "y", drop: float = 1.0, *, slip: bool = False) -> Walls:
         """Flow along an axis from pressure `drop` at its lower wall to 0 at its upper; lateral walls as `slip` says."""

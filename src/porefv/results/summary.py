@@ -133,23 +133,24 @@ def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
     return found
 
 
-def _unusual(flow: PoreFlow) -> dict[str, int]:
-    """Counts of throats and pores that need a rule of their own, by what has been computed of them."""
+def _unusual(flow: PoreFlow) -> dict[str, int | None]:
+    """Counts of throats and pores that need a rule of their own; None for what nothing has computed."""
     throats = flow.mesh.throats
-    counts = {
+    counts: dict[str, np.ndarray | None] = {
         "pores_of_several_pressures": flow.pores_of_several_pressures,
         "closed_throats": throats.closed,
         "throats_without_length": throats.lengths <= 0.0,
         "throats_without_conductance": flow.conductances == 0.0,
         "isolated_pores": flow.solution.isolated,
     }
-    if "volumes" in vars(throats):  # the conductance model has asked for them
+    counts["throats_without_volume"] = counts["throats_without_surface"] = counts["throats_wider_than_the_box"] = None
+    if "volumes" in vars(throats):  # the conductance model, or the forces, need them
         counts["throats_without_volume"] = throats.volumes <= 0.0
         surfaces = throats.wetted_surfaces(flow.walls.slip)
         counts["throats_without_surface"] = surfaces <= 0.0
         # No passage in a box has a hydraulic radius as large as the box: the spheres beside it are dust.
         counts["throats_wider_than_the_box"] = throats.volumes > np.maximum(surfaces, 0.0) * flow.mesh.box.size.min()
-    return {name: int(np.count_nonzero(found)) for name, found in counts.items()}
+    return {name: None if found is None else int(np.count_nonzero(found)) for name, found in counts.items()}
 
 
 def _versions(vtk: bool) -> dict[str, str]:
