@@ -13,8 +13,8 @@ from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.resolved.facet_quadrature import cells_of, facet_points
 from porefv.resolved.fluid_geometry import contacts
-from porefv.resolved.mesh_sampling import cells_of, facet_points
 from porefv.resolved.reference import Run, StokesReference, Values
 from porefv.resolved.refinement import Options, stokes_reference
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.fipy.load import load_fipy
+from porefv.fipy.fipy_import import load_fipy
 from porefv.mesh.polyhedra import polygons
 from porefv.packing.box import WALL_NORMALS, WALLS
 

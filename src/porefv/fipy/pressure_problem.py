@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from porefv.fipy.load import load_fipy
+from porefv.fipy.fipy_import import load_fipy
 from porefv.fipy.pore_mesh import FipyPoreMesh
 from porefv.flow.pore_flow import PoreFlow
 

@@ -17,7 +17,7 @@ from porefv.errors import InputError
 from porefv.flow.walls import Wall, Walls
 from porefv.packing.box import WALL_NORMALS, WALLS, Box
 from porefv.packing.packing import Packing
-from porefv.resolved.mesh_sampling import cells_of, facet_points
+from porefv.resolved.facet_quadrature import cells_of, facet_points
 from porefv.system.atomic_files import atomic_write
 
 if TYPE_CHECKING:
