@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from porefv.conductance.hydraulic_radius import HydraulicRadius
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
@@ -63,10 +62,9 @@ def random_packing():
 
 @pytest.fixture(scope="session")
 def unit_flow():
-    """unit_flow(mesh, walls, model=..., **options): unit viscosity and density, the hydraulic radius unless told."""
+    """unit_flow(mesh, walls, model=None, **options): unit viscosity and density, the default model unless told."""
 
     def unit_flow(mesh, walls, model=None, **options):
-        model = HydraulicRadius() if model is None else model
         return PoreFlow(mesh, walls, Fluid(viscosity=1.0, density=1.0), model, **options)
 
     return unit_flow

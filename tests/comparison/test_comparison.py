@@ -74,7 +74,7 @@ def test_the_command_prints_and_keeps_the_comparison(scene, capsys):
     directory = scene.parent / "results_trade"
     rows = list(csv.DictReader((directory / "trade.csv").open()))
     assert [row["method"] for row in rows] == list(MODELS)
-    assert (directory / "trade.png").stat().st_size > 1000
+    assert (directory / "trade.png").read_bytes().startswith(b"\x89PNG")
     assert cli.main(["trade", str(scene), "--no-resolved"]) == 2  # it holds results now
     assert "--force" in capsys.readouterr().err
 

@@ -213,7 +213,8 @@ def test_forces_in_a_lattice_do_not_show_how_ties_were_cut(lattice, unit_flow):
 def test_forces_of_one_sphere_between_walls_by_hand(unit_flow):
     # Four equal throats along the flow, ΔP = 1: pressure on the disc of the sphere, drag on the rest by surface.
     r = 0.3
-    forces = unit_flow(PoreMesh(Packing([[0.5, 0.5, 0.5]], [r], UNIT)), Walls.along("y")).forces
+    mesh = PoreMesh(Packing([[0.5, 0.5, 0.5]], [r], UNIT))
+    forces = unit_flow(mesh, Walls.along("y"), HydraulicRadius()).forces
     disc = np.pi * r**2
     sphere, walls = 4 * np.pi * r**2 / 12, 0.5
     assert_allclose(forces.pressure[0], [0, disc, 0], rtol=0, atol=1e-15)

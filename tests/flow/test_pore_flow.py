@@ -383,5 +383,5 @@ def test_gravity_that_is_not_a_vector_is_refused(mesh_of, gravity):
 def test_repr_tells_what_flows_where(mesh_of, unit_flow):
     flow = unit_flow(mesh_of("n25_s1"), Walls.along("y"))
     assert repr(flow) == (
-        "PoreFlow(PoreMesh(25 spheres, 122 pores, 240 throats, box 1×1×1 m), hydraulic-radius, y_min 1 Pa, y_max 0 Pa)"
+        "PoreFlow(PoreMesh(25 spheres, 122 pores, 240 throats, box 1×1×1 m), section-friction, y_min 1 Pa, y_max 0 Pa)"
     )

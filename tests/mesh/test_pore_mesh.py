@@ -155,7 +155,7 @@ def test_uniting_hardly_changes_the_permeability_and_keeps_volume(reference, mes
 
 @pytest.mark.parametrize("name", ["n54_s1", "n200_s1"])
 def test_uniting_hardly_changes_forces(reference, mesh_of, unit_flow, name):
-    # Throats that vanish draw no centres of pores, and so leave nothing to jump.
+    # The default model has pore centres, which throats of vanishing length do not move: nothing jumps.
     apart = unit_flow(PoreMesh(reference(name), unite_tolerance=0.0), Walls.along("y")).forces.total
     change = unit_flow(mesh_of(name), Walls.along("y")).forces.total - apart
     assert np.abs(change).max() < 4e-3 * np.abs(apart[:, 1]).mean()
