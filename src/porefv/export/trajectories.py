@@ -62,10 +62,14 @@ class Trajectory:
 
     Examples
     --------
-    >>> trajectory = Trajectory("frames", dem)  # doctest: +SKIP
-    >>> for _ in range(100):  # doctest: +SKIP
-    ...     dem.run(1000)
+    >>> from porefv.dem import DEM
+    >>> dem = DEM(Packing.read("data/packings/n25_s1.csv"), gravity=(0.0, 0.0, -9.81))
+    >>> trajectory = Trajectory("frames", dem)
+    >>> for _ in range(3):
+    ...     dem.run(10)
     ...     trajectory.write()
+    >>> len(trajectory)
+    3
     """
 
     def __init__(self, directory: str | PathLike[str], dem: DEM, contacts: bool = False):

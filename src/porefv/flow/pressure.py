@@ -156,10 +156,10 @@ def solve_pressure(
 
     Examples
     --------
-    >>> mesh, walls = PoreMesh(Packing.read("data/packings/n25_s1.csv")), Walls.along("y")  # doctest: +SKIP
-    >>> conductances = throat_conductances(mesh, SectionFriction(), walls.slip, viscosity=1e-3)  # doctest: +SKIP
-    >>> solve_pressure(mesh, conductances, walls).pressure.max()  # doctest: +SKIP
-    1.0
+    >>> mesh, walls = PoreMesh(Packing.read("data/packings/n25_s1.csv")), Walls.along("y")
+    >>> conductances = throat_conductances(mesh, SectionFriction(), walls.slip, viscosity=1e-3)
+    >>> solve_pressure(mesh, conductances, walls).pressure.shape
+    (122,)
     """
     conductances = check_conductances(mesh, conductances)
     if sources is not None:

@@ -27,8 +27,8 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[Path]:
 
     Examples
     --------
-    >>> with atomic_write("forces.csv") as temporary:  # doctest: +SKIP
-    ...     temporary.write_text("id,fx,fy,fz")
+    >>> with atomic_write("forces.csv") as temporary:
+    ...     _ = temporary.write_text("id,fx,fy,fz")
     """
     target = Path(os.path.realpath(path))
     temporary = _sibling(target)
