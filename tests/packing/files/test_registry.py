@@ -134,6 +134,7 @@ def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
 
 def test_a_missing_vtk_package_is_an_error_that_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
+    monkeypatch.setitem(sys.modules, "vtkmodules", None)
     (tmp_path / "a.vtu").write_text("<?xml version='1.0'?>")
     for ask in (lambda: read_packing(tmp_path / "a.vtu"), lambda: PACKING.write(tmp_path / "a.vtp")):
         with pytest.raises(MissingExtraError, match="VTK files needs .* pip install pyvista"):

@@ -1,18 +1,21 @@
-"""VTK point sets (.vtk, .vtp, .vtu): points with a radius each. XML files go through pyvista.
+"""VTK point sets (.vtk, .vtp, .vtu): points with a radius each. XML files are read by VTK, in a process of its own.
 
 The radius is point data named radius, radii or r, or diameter, in any case. Field data ``box_lower`` and
 ``box_upper`` give the box. Cells are not read.
 """
 
+import io
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from porefv.errors import InputError
+from porefv.errors import InputError, MissingExtraError
 from porefv.packing.box import Box
 from porefv.packing.files.text import AnyPath, make_box, quoted, read_bytes
 from porefv.packing.files.vtk_legacy import LegacyMesh
@@ -23,20 +26,17 @@ from porefv.system.optional_imports import load
 _HALVES = {"radius": 1.0, "radii": 1.0, "r": 1.0, "diameter": 0.5, "diameters": 0.5}
 _CORNERS = ("box_lower", "box_upper")
 
-# Reads a file in no more memory than an honest one of its size takes.
-_TRIAL = """
-import os, sys
-from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
-try:
-    import resource
-    room = 2**32 + 100 * os.path.getsize(sys.argv[1])
-    resource.setrlimit(resource.RLIMIT_AS, (room, room))
-except (ImportError, OSError, ValueError):
-    pass
-reader = vtkXMLGenericDataObjectReader()
-reader.SetFileName(sys.argv[1])
-reader.Update()
-"""
+# The program that reads XML files, in a process of its own.
+_READER = Path(__file__).with_name("vtk_xml_process.py")
+
+
+@dataclass(frozen=True)
+class _XmlMesh:
+    """What an XML file holds, under the names of `LegacyMesh`."""
+
+    points: np.ndarray
+    point_data: dict[str, np.ndarray]
+    field_data: dict[str, np.ndarray]
 
 
 def read(path: AnyPath) -> Packing:
@@ -91,36 +91,31 @@ def _serialised(points: Any, suffix: str) -> bytes:
     return content if isinstance(content, bytes) else content.encode()  # text, where its bytes happen to be UTF-8
 
 
-def _read_mesh(path: AnyPath) -> Any:
-    """The data set in a file: a pyvista mesh or a LegacyMesh."""
+def _read_mesh(path: AnyPath) -> LegacyMesh | _XmlMesh:
     content = read_bytes(path)
     if content.startswith(b"# vtk DataFile"):
         return LegacyMesh(path, content)
     if not content[:100].lstrip().startswith((b"<?xml", b"<VTKFile")):
         raise InputError(f"{path}: not a VTK file (legacy .vtk, or XML .vtp or .vtu).")
-    pyvista = load("pyvista", "Reading VTK files")
-    # A damaged size makes VTK ask for more memory than there is, and that ends the process: let it be another one.
-    trial = subprocess.run([sys.executable, "-c", _TRIAL, os.fspath(path)], capture_output=True, check=False)
-    if trial.returncode != 0:
-        raise InputError(f"{path}: cannot be read as VTK (its reader breaks down). Is the file damaged?")
-    # pyvista.read would repeat on the terminal what VTK says about a bad file.
-    from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
-
-    reader = vtkXMLGenericDataObjectReader()
-    reader.SetFileName(str(path))
-    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
-        reader.Update()
-    if caught.events:
-        # Of several lines the last says what is wrong; those before say where in VTK's source.
-        reason = caught.events[0].alert.strip().splitlines()[-1].rstrip(".!")
-        raise InputError(f"{path}: cannot be read as VTK ({reason[:100]}). Is the file damaged?")
-    mesh = reader.GetOutput()
-    if not (hasattr(mesh, "GetPointData") and mesh.GetNumberOfPoints()):
-        raise InputError(f"{path}: no points can be read from it. Is the file damaged?")
-    return pyvista.wrap(mesh)
+    if find_spec("vtkmodules") is None:
+        raise MissingExtraError("pyvista", "Reading VTK files")
+    # -P: modules beside the program do not hide those of Python.
+    command = [sys.executable, "-P", os.fspath(_READER), os.fspath(path)]
+    done = subprocess.run(command, capture_output=True, check=False)
+    if done.returncode != 0:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = said[-1][:100] if done.returncode == 1 and said else "its reader breaks down"
+        raise InputError(f"{path}: cannot be read as VTK ({reason}). Is the file damaged?")
+    with np.load(io.BytesIO(done.stdout)) as arrays:
+        kinds: dict[str, dict[str, np.ndarray]] = {"point": {}, "field": {}}
+        for key in arrays.files:
+            if key != "points":
+                kind, name = key.split("/", 1)
+                kinds[kind][name] = arrays[key]
+        return _XmlMesh(arrays["points"], kinds["point"], kinds["field"])
 
 
-def _box(path: AnyPath, mesh: Any) -> Box | None:
+def _box(path: AnyPath, mesh: LegacyMesh | _XmlMesh) -> Box | None:
     if not any(name in mesh.field_data for name in _CORNERS):
         return None
     missing = [name for name in _CORNERS if name not in mesh.field_data]
