@@ -32,6 +32,7 @@ What most scripts need is reachable from here and loaded when first used::
 from typing import TYPE_CHECKING
 
 from porefv.system.lazy_exports import lazy_exports
+from porefv.system.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from porefv.conductance.conductances import throat_conductances
@@ -54,8 +55,6 @@ if TYPE_CHECKING:
     from porefv.packing.box import WALLS, Box
     from porefv.packing.packing import Packing
     from porefv.tessellation.triangulation import RegularTriangulation
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "Box": "porefv.packing.box",
@@ -91,8 +90,5 @@ __all__ = [
     "RegularTriangulation", "SectionFriction", "Throats", "WALLS", "Wall", "Walls", "acting_pressure", "fluxes",
     "grain_forces", "solve_pressure", "throat_conductances",
 ]  # fmt: skip
-__getattr__ = lazy_exports(__name__, _HOMES)
-
-
-def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+if not TYPE_CHECKING:  # a type checker would take any name for granted
+    __getattr__, __dir__ = lazy_exports(__name__, _HOMES)

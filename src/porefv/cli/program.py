@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from porefv import __version__
 from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
 from porefv.errors import PorefvError
 from porefv.system import memory
+from porefv.system.version import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

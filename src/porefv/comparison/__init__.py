@@ -3,7 +3,7 @@
 from porefv.system.lazy_exports import lazy_exports
 
 __all__ = ["Method", "MethodComparison", "MethodResult", "compare"]
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "Method": "porefv.comparison.methods",

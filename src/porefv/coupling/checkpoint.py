@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from porefv import __version__
 from porefv.conductance.registry import conductance_model
 from porefv.coupling.coupling import Coupling, Effort
 from porefv.dem import checkpoint as grains_checkpoint
@@ -24,6 +23,7 @@ from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
 from porefv.system.atomic_files import atomic_write
+from porefv.system.version import __version__
 
 FORMAT, VERSION = "porefv.coupling", 1
 

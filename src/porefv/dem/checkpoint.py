@@ -15,12 +15,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from porefv import __version__
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
 from porefv.system.atomic_files import atomic_write
+from porefv.system.version import __version__
 
 FORMAT, VERSION = "porefv.dem", 2
 State = TypeVar("State")

@@ -13,7 +13,7 @@
 from porefv.system.lazy_exports import lazy_exports
 
 __all__ = ["Options", "Run", "StokesReference", "Values", "stokes_reference"]
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "Options": "porefv.resolved.refinement",

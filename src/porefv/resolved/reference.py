@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import porefv
 from porefv.errors import InputError
 from porefv.flow.walls import Wall, Walls
 from porefv.packing.box import WALL_NORMALS, WALLS, Box
 from porefv.packing.packing import Packing
 from porefv.resolved.facet_quadrature import cells_of, facet_points
 from porefv.system.atomic_files import atomic_write
+from porefv.system.version import __version__
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
@@ -356,5 +356,5 @@ def _text(content: dict[str, Any]) -> str:
 
 def versions() -> dict[str, str]:
     """Of what the numbers depend on."""
-    found = {"porefv": porefv.__version__, "python": platform.python_version()}
+    found = {"porefv": __version__, "python": platform.python_version()}
     return found | {name: version(name) for name in ("numpy", "ngsolve", "netgen-mesher")}

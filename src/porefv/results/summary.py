@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import porefv
 from porefv.errors import ComputationError
 from porefv.packing.box import WALLS
+from porefv.system.version import __version__
 
 if TYPE_CHECKING:
     from porefv.flow.pore_flow import PoreFlow
@@ -154,7 +154,7 @@ def _unusual(flow: PoreFlow) -> dict[str, int | None]:
 
 
 def _versions(vtk: bool) -> dict[str, str]:
-    found = {"porefv": porefv.__version__, "python": platform.python_version()}
+    found = {"porefv": __version__, "python": platform.python_version()}
     for name in ("numpy", "scipy", "numba", *(["vtk"] if vtk else [])):
         try:
             found[name] = version(name)

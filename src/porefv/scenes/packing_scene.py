@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv import __version__
 from porefv.dem.dem import DEM
 from porefv.dem.growth import grow
 from porefv.dem.material import Material
@@ -26,6 +25,7 @@ from porefv.packing.packing import Packing
 from porefv.scenes.shared_tables import read_material
 from porefv.scenes.table import SceneFile, Table
 from porefv.system.progress import Progress
+from porefv.system.version import __version__
 
 METHODS = ("cloud", "growth", "settling")
 _WRITTEN = ("csv", "yade", "vtk")  # formats

@@ -13,7 +13,7 @@ In Python::
 from porefv.system.lazy_exports import lazy_exports
 
 __all__ = ["check", "read_profiles", "read_series", "run"]
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "check": "porefv.simulation.simulate",

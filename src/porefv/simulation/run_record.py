@@ -12,7 +12,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from porefv import __version__
 from porefv.coupling import checkpoint as coupled_checkpoint
 from porefv.coupling.coupling import Coupling
 from porefv.dem import checkpoint as dry_checkpoint
@@ -20,6 +19,7 @@ from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
 from porefv.simulation.series import PARQUET, PROFILES, SERIES
 from porefv.system.atomic_files import atomic_write
+from porefv.system.version import __version__
 
 RECORD, FORMAT, VERSION = "simulation.json", "porefv.simulation", 1
 FRAMES = "frames"
