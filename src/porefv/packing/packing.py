@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import ComputationError, InputError, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
-from porefv.packing.neighbours import neighbour_pairs
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume
-from porefv.packing.triple_overlaps import triple_overlaps
 
 _MOST_SHOWN = 5  # culprits listed in one error
 
@@ -131,6 +129,9 @@ class Packing:
     @cached_property
     def overlaps(self) -> Overlaps:
         """Pairs of spheres that overlap, and spheres that cross walls (none without a box)."""
+        # Not at the top: it loads numba and scipy, which a script that only reads a packing does not need.
+        from porefv.packing.neighbours import neighbour_pairs
+
         try:
             pairs = neighbour_pairs(self.centres, self.radii)
         except InputError as error:
@@ -163,6 +164,8 @@ class Packing:
         crossings, caps = np.zeros((2, len(self), 6))
         crossings[found.wall_spheres, found.wall_ids] = found.wall_depths
         caps[found.wall_spheres, found.wall_ids] = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        from porefv.packing.triple_overlaps import triple_overlaps
+
         return triple_overlaps(found.pairs, self.centres, self.radii, lenses, crossings, caps)
 
     @property
