@@ -23,7 +23,7 @@ os.environ["NUMBA_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 import numpy as np
 from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
-import porefv.coupling.coupling as coupled
+import porefv.coupling.coupling as coupled_grains
 from porefv.coupling.coupling import Coupling
 from porefv.dem.plate import Plate
 from porefv.errors import ComputationError
@@ -149,7 +149,7 @@ def bounded(grains: int, store: Path, scheme: str, viscosity: float, part: float
 
 def stability(grains: int, store: Path) -> None:
     """Largest stable step of both schemes, by bisection, over ten decades of viscosity."""
-    coupled._UNSTABLE = np.inf
+    coupled_grains.UNSTABLE = np.inf
     dem = loaded(grains, store)
     print(f"{grains} grains; the critical dry step is {dem.critical_step:.3g} s; steps as parts of it")
     print("| viscosity, Pa s | semi-implicit | implicit drag | drag number at the default step |")

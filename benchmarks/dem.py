@@ -88,7 +88,7 @@ def packing(grains: int) -> Packing:
     return Packing.read(PACKINGS / "n5000_s1.csv") if grains == 5_000 else mirrored(grains)
 
 
-def assembly(grains: int, material: Material = MATERIAL, **options) -> DEM:
+def sample(grains: int, material: Material = MATERIAL, **options) -> DEM:
     dem = DEM(packing(grains), material, **options)
     speed = 1e-6 * dem.radii.min() / dem.step
     dem.velocities = speed * np.random.default_rng(0).normal(size=(len(dem), 3))
@@ -97,7 +97,7 @@ def assembly(grains: int, material: Material = MATERIAL, **options) -> DEM:
 
 def measure(grains: int) -> tuple[float, int, float]:
     """Seconds of a step, contacts, seconds per grain to list pairs."""
-    dem = assembly(grains, threads=int(os.environ["NUMBA_NUM_THREADS"]))
+    dem = sample(grains, threads=int(os.environ["NUMBA_NUM_THREADS"]))
     steps = max(5, 1_000_000 // grains)
     dem.run(steps)
     best = np.inf
@@ -134,7 +134,7 @@ def largest_step(friction: float) -> float:
     critical = DEM(packing(2_000), material).critical_step
     while high - low > 0.015:
         part = 0.5 * (low + high)
-        dem = assembly(2_000, material, step=part * critical)
+        dem = sample(2_000, material, step=part * critical)
         before = dem.energies.stored
         try:
             dem.run(5_000)

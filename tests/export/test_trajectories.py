@@ -20,7 +20,7 @@ pyvista = pytest.importorskip("pyvista")
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 
 
-def assembly():
+def sample():
     dem = DEM(
         Packing.read(PACKINGS / "n25_s1.csv"),
         Material(young=1e7, friction_angle=25.0),
@@ -32,8 +32,8 @@ def assembly():
     return dem
 
 
-def smooth_assembly():
-    dem = assembly()
+def smooth_sample():
+    dem = sample()
     dem.set_material(Material(young=1e7, stiffness_ratio=0.0, friction_angle=0.0))
     return dem
 
@@ -56,7 +56,7 @@ def files(directory, series="grains"):
 
 
 def test_frames_read_back_as_the_grains_were(tmp_path):
-    dem = assembly()
+    dem = sample()
     trajectory = Trajectory(tmp_path / "new" / "frames", dem)
     expected = []
     for _ in range(3):
@@ -77,7 +77,7 @@ def test_frames_read_back_as_the_grains_were(tmp_path):
 
 def test_the_resultant_force_is_what_changes_the_velocity(tmp_path):
     # Without friction: tangential forces are those of the step before.
-    dem = smooth_assembly()
+    dem = smooth_sample()
     dem.run(100)
     Trajectory(tmp_path, dem).write()
     force, before = frames(tmp_path)[1][0]["force"], dem.velocities
@@ -87,7 +87,7 @@ def test_the_resultant_force_is_what_changes_the_velocity(tmp_path):
 
 
 def test_contacts_are_lines_between_centres_or_to_walls(tmp_path):
-    dem = assembly()
+    dem = sample()
     dem.run(100)
     Trajectory(tmp_path, dem, contacts=True).write()
     contacts, (lines,) = dem.contacts, frames(tmp_path, "contacts")[1]
@@ -103,7 +103,7 @@ def test_contacts_are_lines_between_centres_or_to_walls(tmp_path):
 
 
 def test_normal_forces_are_positive_and_grow_with_the_overlap(tmp_path):
-    dem = smooth_assembly()
+    dem = smooth_sample()
     dem.run(100)
     Trajectory(tmp_path, dem, contacts=True).write()
     contacts, (lines,) = dem.contacts, frames(tmp_path, "contacts")[1]
@@ -125,7 +125,7 @@ def test_grains_apart_have_no_contacts_and_no_lines(tmp_path):
 
 
 def test_walls_are_the_sides_of_the_box_facing_outwards(tmp_path):
-    dem = assembly()
+    dem = sample()
     dem.run(100)
     Trajectory(tmp_path, dem).write()
     (sides,) = frames(tmp_path, "walls")[1]
@@ -145,7 +145,7 @@ def test_walls_are_the_sides_of_the_box_facing_outwards(tmp_path):
 
 
 def test_the_list_names_complete_frames_only_and_is_replaced_at_once(tmp_path, monkeypatch):
-    dem = assembly()
+    dem = sample()
     trajectory = Trajectory(tmp_path, dem)
     trajectory.write()
     before = (tmp_path / "grains.pvd").read_bytes()
@@ -169,7 +169,7 @@ def test_the_list_names_complete_frames_only_and_is_replaced_at_once(tmp_path, m
 
 
 def test_a_second_frame_of_a_step_takes_the_place_of_the_first(tmp_path):
-    dem = assembly()
+    dem = sample()
     trajectory = Trajectory(tmp_path, dem)
     trajectory.write()
     dem.velocities = np.zeros((25, 3))
@@ -181,14 +181,14 @@ def test_a_second_frame_of_a_step_takes_the_place_of_the_first(tmp_path):
 
 def test_a_resumed_run_keeps_earlier_frames_and_drops_later_ones(tmp_path):
     # One run goes through; the other is saved after two frames, writes two more, and goes on from the checkpoint.
-    whole = assembly()
+    whole = sample()
     reference = Trajectory(tmp_path / "whole", whole, contacts=True)
     for _ in range(4):
         whole.run(50)
         reference.write()
 
     directory = tmp_path / "frames"
-    dem = assembly()
+    dem = sample()
     trajectory = Trajectory(directory, dem, contacts=True)
     for frame in range(4):
         dem.run(50 if frame < 2 else 70)
@@ -214,7 +214,7 @@ def test_a_resumed_run_keeps_earlier_frames_and_drops_later_ones(tmp_path):
 
 
 def test_contacts_no_longer_written_are_dropped_with_the_frames_they_belong_to(tmp_path):
-    dem = assembly()
+    dem = sample()
     trajectory = Trajectory(tmp_path, dem, contacts=True)
     for _ in range(2):
         dem.run(20)
@@ -234,24 +234,24 @@ def test_contacts_no_longer_written_are_dropped_with_the_frames_they_belong_to(t
 
 
 def test_a_new_run_does_not_write_over_an_old_one(tmp_path):
-    dem = assembly()
+    dem = sample()
     Trajectory(tmp_path, dem).write()
     with pytest.raises(InputError, match="holds a trajectory of 1 frame, and this run is at its start"):
-        Trajectory(tmp_path, assembly())
+        Trajectory(tmp_path, sample())
 
 
 @pytest.mark.parametrize("content", ["", "no xml", "<a><DataSet file='x.vtp' timestep='0'/></a>", "<a><DataSet/></a>"])
 def test_a_foreign_list_is_refused_before_anything_is_written(tmp_path, content):
     (tmp_path / "walls.pvd").write_text(content)
     with pytest.raises(InputError, match=r"walls\.pvd is not a list of frames of porefv, or it is damaged"):
-        Trajectory(tmp_path, assembly())
+        Trajectory(tmp_path, sample())
     assert [path.name for path in tmp_path.iterdir()] == ["walls.pvd"]
 
 
 def test_a_file_in_place_of_the_directory_is_named(tmp_path):
     (tmp_path / "frames").write_text("")
     with pytest.raises(InputError, match="cannot make the directory .*frames"):
-        Trajectory(tmp_path / "frames", assembly())
+        Trajectory(tmp_path / "frames", sample())
 
 
 def test_vtk_is_loaded_by_those_who_write_frames_only():

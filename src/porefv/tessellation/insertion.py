@@ -6,7 +6,7 @@ Arrays (capacity m cells)
     planes (m, 4)            (2 P, β): f(q) = |c_q|² - r_q² - β - 2 P·c_q is q's power to P less ρ² (six operations)
     bounds (m,)              bound on the rounding error of f for any q in the box
     marks (m,) int32         +s / -s: cell found in conflict / not in conflict with the s-th inserted sphere
-    ends (m, 4) int32        new cell built on each facet of the cavity's rim
+    ends (m, 4) int32        new cell built on each facet of the cavity's boundary
     free (m,) int32          stack of unused cells
     state (4,) int64         [number in `free`, first never-used cell, last new cell, spheres inserted]
 """
@@ -52,8 +52,8 @@ def insert(
     """Insert the spheres order[first:]; returns how many were done (fewer where the arrays are full)."""
     capacity = cells.shape[0]
     stack = np.empty(1024, np.int32)
-    rim_cells = np.empty(1024, np.int32)
-    rim_facets = np.empty(1024, np.int8)
+    boundary_cells = np.empty(1024, np.int32)
+    boundary_facets = np.empty(1024, np.int8)
     dead = np.empty(1024, np.int32)
     for k in range(first, order.shape[0]):
         q = order[k]
@@ -73,7 +73,7 @@ def insert(
         marks[t] = stamp
         stack[0] = t
         n_stack = 1
-        n_rim = 0
+        n_boundary = 0
         n_dead = 0
         while n_stack > 0:
             n_stack -= 1
@@ -84,9 +84,9 @@ def insert(
             n_dead += 1
             if n_stack + 4 >= stack.shape[0]:
                 stack = doubled(stack)
-            if n_rim + 4 >= rim_cells.shape[0]:
-                rim_cells = doubled(rim_cells)
-                rim_facets = doubled(rim_facets)
+            if n_boundary + 4 >= boundary_cells.shape[0]:
+                boundary_cells = doubled(boundary_cells)
+                boundary_facets = doubled(boundary_facets)
             for i in range(4):
                 u = neighbours[c, i]
                 inside = False
@@ -108,18 +108,18 @@ def insert(
                     stack[n_stack] = u
                     n_stack += 1
                 else:
-                    rim_cells[n_rim] = c
-                    rim_facets[n_rim] = i
-                    n_rim += 1
-        if n_rim > state[0] + capacity - state[1]:
+                    boundary_cells[n_boundary] = c
+                    boundary_facets[n_boundary] = i
+                    n_boundary += 1
+        if n_boundary > state[0] + capacity - state[1]:
             for d in range(n_dead):  # undo the marks: this sphere is inserted again into larger arrays
                 marks[dead[d]] = 0
             return k
 
-        # One new cell on each facet of the rim: the facet and q.
-        for b in range(n_rim):
-            c = rim_cells[b]
-            i = rim_facets[b]
+        # One new cell on each facet of the boundary: the facet and q.
+        for b in range(n_boundary):
+            c = boundary_cells[b]
+            i = boundary_facets[b]
             if state[0] > 0:
                 state[0] -= 1
                 new = np.int64(free[state[0]])
@@ -141,10 +141,10 @@ def insert(
             _place(new, q, n, points, weights, cells, planes, bounds, extent, magnitude)
             state[2] = new
 
-        # New cells meet across facets through q: turn about the edge they share until the rim is met again.
-        for b in range(n_rim):
-            c = rim_cells[b]
-            i = rim_facets[b]
+        # New cells meet across facets through q: turn about the edge they share until the boundary is met again.
+        for b in range(n_boundary):
+            c = boundary_cells[b]
+            i = boundary_facets[b]
             new = ends[c, i]
             for j in range(4):
                 if j == i or neighbours[new, j] != -2:
