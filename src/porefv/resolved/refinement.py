@@ -151,19 +151,19 @@ def _run(
     low = float(np.nanmin(walls.pressures))
     drop = float(np.nanmax(walls.pressures)) - low
     with progress.stage("meshing"):
-        fluid = fluid_mesh(
+        domain = fluid_mesh(
             (packing.centres - box.lower) / length, packing.radii / length, np.zeros(3), box.size / length,
             order=options.order, mesh_size=mesh_size, delta=delta, regularisation=options.contacts,
         )  # fmt: skip
-    field = solve_stokes(fluid, options.order, (walls.pressures - low) / (drop or 1.0), walls.slip, progress)
+    field = solve_stokes(domain, options.order, (walls.pressures - low) / (drop or 1.0), walls.slip, progress)
     with progress.stage("reading off"):
         values, imbalance = read_off(field, mesh, viscosity, low, drop)
     run = Run(
         mesh_size=mesh_size,
         delta=delta,
-        elements=fluid.mesh.ne,
+        elements=domain.mesh.ne,
         unknowns=field.unknowns,
-        straightened=fluid.straightened,
+        straightened=domain.straightened,
         seconds=round(time.perf_counter() - begin, 2),
         permeability=_permeability(values, mesh, walls, viscosity),
         thrust_residual=field.residual,

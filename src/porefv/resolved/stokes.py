@@ -41,7 +41,7 @@ class StokesField:
 
     Attributes
     ----------
-    fluid : FluidMesh
+    domain : FluidMesh
     order : int
         Of the velocity, before it is raised in throats.
     velocity : ngsolve.CoefficientFunction
@@ -60,7 +60,7 @@ class StokesField:
         Walls of imposed pressure.
     """
 
-    fluid: FluidMesh
+    domain: FluidMesh
     order: int
     velocity: Any
     pressure: Any
@@ -81,7 +81,7 @@ class StokesField:
 
     def velocity_at(self, points: np.ndarray) -> np.ndarray:
         """(q, 3): velocity at each point, zero in the solid."""
-        places, inside = self.fluid.at(points)
+        places, inside = self.domain.at(points)
         values = np.zeros((len(points), 3))
         if inside.any():
             values[inside] = np.asarray(self.velocity(places)).reshape(-1, 3)
@@ -89,7 +89,7 @@ class StokesField:
 
     def pressure_at(self, points: np.ndarray) -> np.ndarray:
         """(q,): pressure at each point, NaN in the solid."""
-        places, inside = self.fluid.at(points)
+        places, inside = self.domain.at(points)
         values = np.full(len(points), np.nan)
         if inside.any():
             values[inside] = np.asarray(self.pressure(places)).ravel()
@@ -100,10 +100,10 @@ class StokesField:
         import ngsolve as ngs
 
         rule = ngs.IntegrationRule(ngs.TET, 4)
-        places = self.fluid.mesh.MapToAllElements({ngs.TET: rule}, ngs.VOL)
+        places = self.domain.mesh.MapToAllElements({ngs.TET: rule}, ngs.VOL)
         points = np.asarray(ngs.CF((ngs.x, ngs.y, ngs.z))(places)).reshape(-1, 3)
         determinant = np.asarray(ngs.Det(ngs.specialcf.JacobianMatrix(3))(places)).ravel()
-        volumes = np.abs(determinant) * np.tile(np.array(rule.weights), self.fluid.mesh.ne)
+        volumes = np.abs(determinant) * np.tile(np.array(rule.weights), self.domain.mesh.ne)
         return points, volumes, np.asarray(self.pressure(places)).ravel()
 
     def wall_samples(self, wall: int) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +111,7 @@ class StokesField:
         import ngsolve as ngs
 
         rule = ngs.IntegrationRule(ngs.TRIG, 2 * self.order)
-        places = self.fluid.mesh.MapToAllElements({ngs.TRIG: rule}, self.fluid.mesh.Boundaries(f"wall{wall}"))
+        places = self.domain.mesh.MapToAllElements({ngs.TRIG: rule}, self.domain.mesh.Boundaries(f"wall{wall}"))
         points = np.asarray(ngs.CF((ngs.x, ngs.y, ngs.z))(places)).reshape(-1, 3)
         speed = -WALL_SENSES[wall] * np.asarray(self.velocity(places)).reshape(-1, 3)[:, WALL_AXES[wall]]
         jacobian = np.asarray(ngs.specialcf.JacobianMatrix(3, 2)(places)).reshape(-1, 3, 2)
@@ -158,13 +158,13 @@ def _squeezed(mesh: Any, no_slip: list[int]) -> list[Any]:
 
 
 def solve_stokes(
-    fluid: FluidMesh, order: int, pressures: np.ndarray, slip: np.ndarray, progress: Progress
+    domain: FluidMesh, order: int, pressures: np.ndarray, slip: np.ndarray, progress: Progress
 ) -> StokesField:
     """Solve for the flow.
 
     Parameters
     ----------
-    fluid : FluidMesh
+    domain : FluidMesh
     order : int
         Of the velocity; the pressure's is one less.
     pressures, slip : (6,) arrays
@@ -178,8 +178,8 @@ def solve_stokes(
     """
     import ngsolve as ngs
 
-    space = _spaces(fluid.mesh, order, pressures, slip)
-    _ensure_memory(fluid.mesh.ne, space.ndof, progress)
+    space = _spaces(domain.mesh, order, pressures, slip)
+    _ensure_memory(domain.mesh.ne, space.ndof, progress)
     with progress.stage("assembly"):
         *u, p = space.TrialFunction()
         *v, q = space.TestFunction()
@@ -207,7 +207,7 @@ def solve_stokes(
     left = float(np.linalg.norm(reactions[free])) / driven
     if not left < 1e-6:
         raise ComputationError(f"the factorisation failed: a residual of {left:.1e} is left; change --mesh-size")
-    return _read_off(fluid, order, space, field, reactions, load.vec.FV().NumPy(), pressures, slip)
+    return _read_off(domain, order, space, field, reactions, load.vec.FV().NumPy(), pressures, slip)
 
 
 def _ensure_memory(elements: int, unknowns: int, progress: Progress) -> None:
@@ -221,12 +221,12 @@ def _ensure_memory(elements: int, unknowns: int, progress: Progress) -> None:
     progress.note(stated)
 
 
-def _read_off(fluid, order, space, field, reactions, load, pressures, slip) -> StokesField:
+def _read_off(domain, order, space, field, reactions, load, pressures, slip) -> StokesField:
     """Fluxes and forces of a solution; `reactions` is the force of the fluid on what holds its velocities."""
     import ngsolve as ngs
 
-    mesh = fluid.mesh
-    bodies = len(fluid.radii) + 6
+    mesh = domain.mesh
+    bodies = len(domain.radii) + 6
     velocity = ngs.CF(tuple(field.components[:3]))
     pressure = field.components[3]
     names = mesh.GetBoundaries()
@@ -245,14 +245,14 @@ def _read_off(fluid, order, space, field, reactions, load, pressures, slip) -> S
 
     through = by_element(velocity * normal)
     wall_flux = np.array([-through[wall_of == wall].sum() for wall in range(6)])
-    owners = np.where(wall_of >= 0, bodies - 6 + wall_of, _nearest_sphere(positions[corners].mean(axis=1), fluid))
+    owners = np.where(wall_of >= 0, bodies - 6 + wall_of, _nearest_sphere(positions[corners].mean(axis=1), domain))
     on_surface = np.stack(
         [np.bincount(owners, by_element(pressure * normal[axis]), bodies) for axis in range(3)], axis=1
     )
 
     # Constants are sums of the vertices' shape functions alone: reactions at vertices add up to forces.
     solid = np.unique(corners[wall_of < 0])
-    nearest = _nearest_sphere(positions[solid], fluid)
+    nearest = _nearest_sphere(positions[solid], domain)
     on_wall = np.zeros((6, mesh.nv), bool)
     for wall in range(6):
         on_wall[wall, corners[wall_of == wall]] = True
@@ -263,18 +263,18 @@ def _read_off(fluid, order, space, field, reactions, load, pressures, slip) -> S
         begin = space.Range(axis).start
         reaction = reactions[begin : begin + mesh.nv]
         total[: bodies - 6, axis] = np.bincount(nearest, reaction[solid], bodies - 6)
-        total[bodies - 6 :, axis] = _wall_shares(on_wall, axis, pressures, slip) @ reaction
+        total[bodies - 6 :, axis] = _wall_portions(on_wall, axis, pressures, slip) @ reaction
         thrust[axis] = load[begin : begin + mesh.nv].sum()
     n = bodies - 6
     return StokesField(
-        fluid, order, velocity, pressure, space.ndof, wall_flux,
+        domain, order, velocity, pressure, space.ndof, wall_flux,
         total[:n], on_surface[:n], total[n:], on_surface[n:], thrust, ~np.isnan(pressures),
     )  # fmt: skip
 
 
-def _nearest_sphere(points: np.ndarray, fluid: FluidMesh) -> np.ndarray:
+def _nearest_sphere(points: np.ndarray, domain: FluidMesh) -> np.ndarray:
     """The sphere nearest in power to each point: whose surface, flat or half of a bridge it lies on."""
-    powers = ((points[:, None, :] - fluid.centres) ** 2).sum(axis=2) - fluid.radii**2
+    powers = ((points[:, None, :] - domain.centres) ** 2).sum(axis=2) - domain.radii**2
     return powers.argmin(axis=1)
 
 
@@ -292,19 +292,19 @@ def _senses(mesh: Any, surface: list[Any], positions: np.ndarray, corners: np.nd
     return np.where((normals * inward).sum(axis=1) < 0.0, 1.0, -1.0)
 
 
-def _wall_shares(on_wall: np.ndarray, axis: int, pressures: np.ndarray, slip: np.ndarray) -> np.ndarray:
+def _wall_portions(on_wall: np.ndarray, axis: int, pressures: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """(6, nv): part of the reaction along an axis at each vertex that each wall bears.
 
     On the edges of the box it goes to the wall that the axis is normal to, else to the walls that drag, in equal parts,
     else to the open walls, which keep the fluid from flowing along them.
     """
-    shares = np.zeros(on_wall.shape)
+    portions = np.zeros(on_wall.shape)
     left = np.ones(on_wall.shape[1], bool)
     closed = np.isnan(pressures)
     normal = WALL_AXES == axis
     for bears in (closed & normal, closed & ~normal & ~slip, ~closed & ~normal):
         those = on_wall & bears[:, None] & left
         count = those.sum(axis=0)
-        shares += those / np.maximum(count, 1)
+        portions += those / np.maximum(count, 1)
         left &= count == 0
-    return shares
+    return portions

@@ -9,7 +9,7 @@ import numpy as np
 
 from porefv.errors import ComputationError, InputError
 
-# Sizes of pressures, viscosities, densities and accelerations, such that no product of them leaves double precision.
+# Sizes of numbers such that products of several of them do not leave double precision.
 LEAST, MOST = 1e-60, 1e60
 
 
@@ -35,5 +35,7 @@ def ensure_finite(values: np.ndarray, what: str) -> np.ndarray:
     """The values; a ComputationError if any of them is not finite."""
     bad = np.count_nonzero(~np.isfinite(values))
     if bad:
-        raise ComputationError(f"{bad} of {values.size} {what} are not finite numbers; nothing can be said of the flow")
+        raise ComputationError(
+            f"{bad} of {values.size} {what} are not finite numbers; nothing can be computed from them"
+        )
     return values
