@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -30,6 +29,7 @@ from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.system import memory
 
 PACKINGS = Path(__file__).resolve().parents[1] / "data" / "packings"
 REPEATS = {2_000: 5, 20_000: 5, 160_000: 2, 1_000_000: 1}
@@ -118,8 +118,8 @@ def run(packing: Packing, conductance: str) -> tuple[dict[str, float], PoreFlow]
 
 
 def peak() -> int:
-    """Largest resident size of this process so far [MiB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    """Largest resident size of this process so far [MiB]; 0 where the system does not say."""
+    return (memory.peak_resident() or 0) // 2**20
 
 
 def child(spheres: int, threads: int, conductance: str) -> dict:

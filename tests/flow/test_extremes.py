@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -527,6 +526,12 @@ def untouched(project):
     )
 
 
+def limit_files_to(size):
+    import resource  # of POSIX
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
 def solving(project, **options):
     command = [sys.executable, "-m", "porefv", "solve", str(project / "scene.toml"), "--force", "--quiet"]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **options)
@@ -554,7 +559,7 @@ def test_an_interruption_leaves_what_existed_and_nothing_half_written(project, a
 @posix
 @pytest.mark.parametrize("room", [0, 300_000])
 def test_a_full_disk_loses_nothing_that_existed(project, room):
-    process = solving(project, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)))
+    process = solving(project, preexec_fn=lambda: limit_files_to(room))
     _, said = process.communicate(timeout=60)
     assert process.returncode == 2, said
     assert "cannot write" in said and "Traceback" not in said
@@ -572,7 +577,7 @@ def test_a_packing_written_to_a_full_disk_leaves_the_old_one(tmp_path, name):
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(PACKINGS / "n2000_s1.csv"), str(tmp_path / name)],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+        preexec_fn=lambda: limit_files_to(20_000),
         capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert done.returncode == 1 and done.stderr.startswith("refused: cannot write"), done.stderr

@@ -225,8 +225,8 @@ def test_a_run_that_is_killed_goes_on_to_the_last_bit(path, tmp_path):
             if point["coupled"] and point["step"] > 500:
                 break
         time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL
+    process.kill()
+    assert process.wait() not in (0, 2, 130)
     assert json.loads(stopped.read_text())["status"] == "running"
     shutil.copyfile(stopped, tmp_path / "when_killed.json")
     with (tmp_path / "results" / "series.csv").open("a") as file:
@@ -266,7 +266,7 @@ def test_an_interrupt_waits_for_a_checkpoint(path, monkeypatch, capsys):
         original(dem, steps)
         if dem.steps > 150 and not sent:
             sent.append(dem.steps)
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(DEM, "run", interrupted)
     assert main(["simulate", str(path)]) == 130

@@ -1,7 +1,6 @@
 """Kernels are compiled and run, whether or not they can be kept on disk."""
 
 import os
-import resource
 import subprocess
 import sys
 
@@ -41,6 +40,8 @@ def test_kernels_are_kept_where_there_is_room(tmp_path):
 
 @posix
 def test_on_a_full_disk_kernels_are_compiled_all_the_same(tmp_path):
+    import resource  # of POSIX
+
     done = run(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)), NUMBA_CACHE_DIR=str(tmp_path))
     check(done, "File too large")
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
