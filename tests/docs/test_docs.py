@@ -17,7 +17,7 @@ from porefv.scenes import flow_scene, shared_tables
 from porefv.scenes.flow_scene import FlowScene
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "data/README.md")]
+PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "data/README.md")]
 PAGES += sorted((ROOT / "docs").glob("*.md"))
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?: \d{3}\b)*(?:\.\d+)?(?:e[-+]?\d+)?")
 
