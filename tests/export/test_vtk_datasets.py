@@ -2,7 +2,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista
 
 from porefv.errors import InputError
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
