@@ -10,7 +10,6 @@ step triangulates, computes conductances, solves and sums up forces: the same as
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import shutil
 import subprocess
 import sys
@@ -57,8 +56,8 @@ def stages(scene: FlowScene) -> dict[str, float]:
     """Seconds of each stage, reading and writing included."""
     progress = Progress(quiet=True)
     with tempfile.TemporaryDirectory() as folder:
-        output = dataclasses.replace(scene.output, directory=Path(folder) / "results")
-        dataclasses.replace(scene, output=output).solve(progress=progress)
+        output = scene.output.model_copy(update={"directory": Path(folder) / "results"})
+        scene.model_copy(update={"output": output}).solve(progress=progress)
     return progress.seconds
 
 

@@ -1,7 +1,6 @@
 """README and docs are true: their Python runs, commands say what is printed, scenes are valid, links lead somewhere."""
 
 import contextlib
-import inspect
 import io
 import os
 import re
@@ -13,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from porefv import cli
-from porefv.scenes import flow_scene, shared_tables
 from porefv.scenes.flow_scene import FlowScene
 
 ROOT = Path(__file__).parents[2]
@@ -127,13 +125,3 @@ def test_continuous_integration_runs_the_command_of_the_readme():
     commands = [text.strip() for _, text in blocks(ROOT / "README.md", "sh")]
     assert any("pytest" in command and command in script for command in commands)
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
-
-
-def test_scene_reference_names_every_key():
-    page = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
-    readers = (flow_scene, shared_tables.read_packing_file, shared_tables.read_fluid, shared_tables.read_conductance)
-    source = "".join(map(inspect.getsource, readers))
-    known = re.findall(r"\.only\(([^)]*)\)", source)
-    keys = {key for names in known for key in re.findall(r'"(\w+)"', names)} - {"wall"}
-    assert len(keys) > 15
-    assert [key for key in sorted(keys) if f"`{key}`" not in page and f"`[{key}]`" not in page] == []

@@ -7,7 +7,7 @@ from porefv.conductance.effective_radius import EffectiveRadius
 from porefv.conductance.registry import AUTO
 from porefv.errors import ComputationError, InputError
 from porefv.scenes.flow_scene import FlowScene
-from porefv.scenes.table import line_of
+from porefv.scenes.toml_file import line_of
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -82,6 +82,13 @@ def test_what_a_scene_leaves_out_has_defaults():
     assert scene.output.quantities == ("permeability",)
     assert scene.output.vtk is False
     assert not scene.walls.slip.any()
+
+
+def test_none_stands_for_what_is_left_out():
+    scene = FlowScene.from_mapping(mapping(box=None, flow={"alpha": None}, mesh=None), directory=DATA / "packings")
+    assert scene.box is None and scene.mesh.wall_tolerance == 0.05
+    with pytest.raises(InputError, match="packing: missing; give it at the top of the file"):
+        FlowScene.from_mapping(mapping(packing=None))
 
 
 def test_lateral_is_every_wall_not_named():
@@ -209,6 +216,8 @@ BAD = {
     "unite_tolerance": ("[flow]", "[mesh]\nunite_tolerance = -0.1\n[flow]", "must lie in .0, 1"),
     "flat box": ("[flow]", "[box]\nlower = [0, 0, 0]\nupper = [0, 1, 1]\n[flow]", "line 9: .box. .* 0 m"),
     "half a box": ("[flow]", "[box]\nlower = [0, 0, 0]\n[flow]", "line 7: .box. upper: missing"),
+    "unknown format": ("packing =", "[packing]\nformat = 'cvs'\nfile =", "line 2: .packing. format: .* mean 'csv'"),
+    "pressure out of range": ("1.0 }", "1e300 }", "line 5: .walls.y_min. pressure: a wall's pressure must be"),
     "missing packing": ("n25_s1.csv", "n26.csv", "line 1: packing: .*n26.csv does not exist"),
     "packing a directory": ("/n25_s1.csv", "", "packing: .* is not a file"),
     "packing not named": ("packing =", "# packing =", "packing: missing"),
@@ -227,6 +236,29 @@ def test_bad_scenes_are_refused_with_file_line_and_remedy(write_scene, case):
         FlowScene.read(path)
     assert str(path) in str(error.value)
     assert len(str(error.value).splitlines()) < 20
+
+
+def test_several_errors_stand_in_the_order_of_their_lines(write_scene):
+    path = write_scene('"auto"', '"dirct"\ntolerance = 2.0\nalpha = "a"')
+    text = path.read_text().replace("viscosity = 1.0e-3", "viscosity = true\ndensity = []")
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        FlowScene.read(path)
+    assert str(error.value).splitlines() == [
+        f"{path}, line 3: [fluid] viscosity: expected a finite number, not True",
+        f"{path}, line 4: [fluid] density: expected a finite number, not []",
+        f"{path}, line 9: [flow] solver: unknown solver 'dirct'; did you mean 'direct'?",
+        f"{path}, line 10: [flow] tolerance: must lie between 0 and 1 (a bound on the relative residual), not 2.0",
+        f"{path}, line 11: [flow] alpha: expected a finite number, not 'a'",
+    ]
+    path.write_text(text.replace("pressure = 1.0", "slip = 1"))
+    with pytest.raises(InputError, match=r"\[walls.y_min\] slip: (.|\n)*\.\.\. and 1 more$"):
+        FlowScene.read(path)
+
+
+def test_long_values_are_cut_in_errors(write_scene):
+    with pytest.raises(InputError, match=r"not 10{79}\.\.\.$"):
+        FlowScene.read(write_scene("1.0e-3", "1" + 400 * "0"))
 
 
 def test_flow_without_any_pressure_wall_is_refused(write_scene):

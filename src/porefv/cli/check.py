@@ -23,12 +23,12 @@ def register(commands: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from porefv.cli.compilation import announce_compilation_of_flow
-    from porefv.scenes.table import Table
+    from porefv.scenes.toml_file import SceneSource
     from porefv.system.progress import Progress
 
     progress = Progress()
     announce_compilation_of_flow(progress)
-    keys = Table.read(options.scene).data
+    keys = SceneSource.read(options.scene).data
     if "stages" in keys:
         from porefv.cli import simulate
         from porefv.scenes.simulation_scene import SimulationScene

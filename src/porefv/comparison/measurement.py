@@ -14,6 +14,7 @@ import numpy as np
 from porefv.comparison.methods import Method
 from porefv.conductance.registry import conductance_model
 from porefv.scenes.flow_scene import FlowScene
+from porefv.solvers.solver import TOLERANCE
 from porefv.system.memory import peak_resident, resident
 
 
@@ -49,8 +50,9 @@ def measure(scene_file: Path, method: Method) -> MethodResult:
     model = scene.flow.conductance
     if method.conductance != model.name:
         model = conductance_model(method.conductance)
-    options = replace(scene.flow, conductance=model, solver=method.solver, tolerance=method.tolerance)
-    scene = replace(scene, flow=options)
+    tolerance = TOLERANCE if method.tolerance is None else method.tolerance
+    options = replace(scene.flow, conductance=model, solver=method.solver, tolerance=tolerance)
+    scene = scene.model_copy(update={"flow": options})
     packing = scene.read_packing()
 
     def run() -> tuple[float, np.ndarray]:

@@ -2,55 +2,116 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import model_validator
 
 from porefv.conductance.model import ConductanceModel
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
-from porefv.scenes.shared_tables import PackingFile, read_conductance, read_fluid, read_packing_file
-from porefv.scenes.table import SceneFile, Table
-from porefv.solvers.solver import SOLVERS
+from porefv.scenes.errors import refused
+from porefv.scenes.shared_tables import (
+    BoxTable,
+    ConductanceTable,
+    FluidTable,
+    LateralTable,
+    PackingFile,
+    PathOrTable,
+    SixWalls,
+)
+from porefv.scenes.table import MadeFrom, Scene, Table
+from porefv.scenes.values import Choice, Choices, Limits, ScenePath, Vector, key
+from porefv.solvers.solver import SOLVERS, TOLERANCE
 from porefv.system.progress import Progress
 
+PartOfRadius = Annotated[float, Limits("must lie in [0, 1) (a fraction of a radius)", least=0.0, below=1.0)]
 
-@dataclass(frozen=True)
-class MeshOptions:
-    """As the parameters of `PoreMesh`; None leaves its default."""
 
-    unite_tolerance: float | None = None
-    wall_tolerance: float | None = None
+class WallTable(Table):
+    """What a wall does to the fluid."""
+
+    pressure: float | None = key(
+        "imposed piezometric pressure. Without it the wall is impervious. Not for `lateral`", None, unit="Pa"
+    )
+    slip: bool = key(
+        "whether the fluid slips along the wall, as along a plane of symmetry. If not, the wall drags it", False
+    )
+
+    def make(self) -> Wall:
+        return Wall(self.pressure, self.slip)
+
+
+class WallsTable(SixWalls[Annotated[Wall, MadeFrom(WallTable)]]):
+    """What the walls do to the fluid."""
+
+    lateral: LateralTable = key("all walls that are not named", {})
+
+    def make(self) -> Walls:
+        return Walls(**dict.fromkeys(WALLS, Wall(slip=self.lateral.slip)) | self.named())
+
+
+class MeshOptions(Table):
+    """Tolerances of the mesh of pores, as the parameters of `PoreMesh`."""
+
+    unite_tolerance: PartOfRadius = key(
+        "cells whose Laguerre vertices are closer than this fraction of the smallest radius around are "
+        "[one pore](theory.md#united-pores)",
+        0.01,
+    )
+    wall_tolerance: PartOfRadius = key(
+        "the largest fraction of its radius by which a sphere may reach beyond a wall", 0.05
+    )
 
 
 @dataclass(frozen=True)
 class FlowOptions:
-    """As the parameters of `PoreFlow`; a `tolerance` of None leaves its default."""
+    """As the parameters of `PoreFlow`."""
 
     conductance: ConductanceModel
     solver: str
-    tolerance: float | None
+    tolerance: float
     gravity: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Output:
-    """Which of `porefv.results.directory.QUANTITIES` to compute, whether to write VTK files, and where."""
+class FlowTable(ConductanceTable):
+    """How the flow is computed."""
 
-    directory: Path
-    quantities: tuple[str, ...]
-    vtk: bool
+    solver: Annotated[str, Choice(SOLVERS)] = key(
+        'how the pressures are solved for: `"direct"`, `"cg"`, or the one fit for the size', "auto"
+    )
+    tolerance: Annotated[
+        float, Limits("must lie between 0 and 1 (a bound on the relative residual)", above=0.0, below=1.0)
+    ] = key("bound on the [imbalance](theory.md#solver) of the pressures, between 0 and 1", TOLERANCE)
+    gravity: Vector = key("acceleration of gravity, for buoyancy", (0.0, 0.0, 0.0), unit="m/s²")
+
+    def make(self) -> FlowOptions:
+        return FlowOptions(self.conductance_model(), self.solver, self.tolerance, self.gravity)
 
 
-@dataclass(frozen=True)
-class FlowScene(SceneFile):
-    """A computation, ready to run.
+class FlowOutput(Table):
+    """What is computed and written, and where."""
+
+    directory: ScenePath = key(
+        "where the results go. Existing results are replaced with `porefv solve --force` only",
+        "results",
+    )
+    quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
+        'what is computed: any of `"permeability"`, `"pressure"`, `"forces"`. An empty list computes the pores alone',
+        ("permeability",),
+    )
+    vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
+
+
+class FlowScene(Scene):
+    """A steady flow through a packing that does not move.
 
     Attributes
     ----------
@@ -61,7 +122,7 @@ class FlowScene(SceneFile):
     walls : Walls
     mesh : MeshOptions
     flow : FlowOptions
-    output : Output
+    output : FlowOutput
     path : Path or None
         The scene file.
 
@@ -71,19 +132,35 @@ class FlowScene(SceneFile):
     >>> print(scene.pore_flow().permeability)  # doctest: +SKIP
     """
 
-    packing: PackingFile
-    box: Box | None
-    fluid: Fluid
-    walls: Walls
-    mesh: MeshOptions
-    flow: FlowOptions
-    output: Output
-    path: Path | None = None
+    packing: Annotated[PackingFile, PathOrTable()] = key("the packing file: a path, or the table `[packing]`")
+    box: Annotated[Box, MadeFrom(BoxTable)] | None = key(
+        "the table `[box]`: the box that confines the packing", None, shown="from the packing file"
+    )
+    fluid: Annotated[Fluid, MadeFrom(FluidTable)] = key("the table `[fluid]`: what fills the pores", {})
+    walls: Annotated[Walls, MadeFrom(WallsTable)] = key("the table `[walls]`: what the walls do to the fluid", {})
+    mesh: MeshOptions = key("the table `[mesh]`: tolerances of the mesh of pores", {})
+    flow: Annotated[FlowOptions, MadeFrom(FlowTable)] = key("the table `[flow]`: how the flow is computed", {})
+    output: FlowOutput = key("the table `[output]`: what is computed and written, and where", {})
 
-    @classmethod
-    def from_table(cls, top: Table, directory: Path, path: Path | None = None) -> FlowScene:
-        """The scene that a table says; relative paths in it are relative to `directory`."""
-        return _scene(top, directory, path)
+    @model_validator(mode="after")
+    def _is_driven(self) -> Self:
+        """The walls drive what is asked for."""
+        asked = self.output.quantities
+        held = [(name, wall) for name, wall in zip(WALLS, self.walls, strict=True) if wall.pressure is not None]
+        if asked and not held:
+            raise refused(
+                f"no wall has a pressure, and {', '.join(asked)} cannot be computed without. "
+                "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
+            )
+        pressures = self.walls.pressures
+        axis = self.walls.axis
+        if "permeability" in asked and (axis is None or pressures[2 * axis] == pressures[2 * axis + 1]):
+            described = ", ".join(f"{name} at {wall.pressure:g} Pa" for name, wall in held)
+            raise refused(
+                "permeability needs exactly two pressure walls, opposite each other and at "
+                f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
+            )
+        return self
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
@@ -97,12 +174,10 @@ class FlowScene(SceneFile):
 
     def pore_mesh(self, packing: Packing | None = None) -> PoreMesh:
         """The mesh of the packing, which is read and validated."""
-        options = {name: x for name, x in dataclasses.asdict(self.mesh).items() if x is not None}
-        return PoreMesh(self.read_packing() if packing is None else packing, **options)
+        return PoreMesh(self.read_packing() if packing is None else packing, **dict(self.mesh))
 
     def pore_flow(self, mesh: PoreMesh | None = None) -> PoreFlow:
         """The flow through the packing: nothing is computed yet."""
-        tolerance = {} if self.flow.tolerance is None else {"tolerance": self.flow.tolerance}
         return PoreFlow(
             self.pore_mesh() if mesh is None else mesh,
             self.walls,
@@ -110,7 +185,7 @@ class FlowScene(SceneFile):
             self.flow.conductance,
             gravity=self.flow.gravity,
             solver=self.flow.solver,
-            **tolerance,
+            tolerance=self.flow.tolerance,
         )
 
     def solve(self, *, force: bool = False, progress: Progress | None = None) -> Path:
@@ -164,85 +239,3 @@ class FlowScene(SceneFile):
         """
         check_target(self.output.directory, vtk=self.output.vtk)
         return self.pore_mesh().packing
-
-
-def _scene(top: Table, directory: Path, path: Path | None) -> FlowScene:
-    top.only("packing", "box", "fluid", "walls", "mesh", "flow", "output")
-    scene = FlowScene(
-        packing=read_packing_file(top, directory),
-        box=top.table("box").box() if "box" in top.data else None,
-        fluid=read_fluid(top.table("fluid")),
-        walls=_walls(top.table("walls")),
-        mesh=_mesh(top.table("mesh")),
-        flow=_flow(top.table("flow")),
-        output=_output(top.table("output"), directory),
-        path=path,
-    )
-    _check_driven(scene, top.source)
-    return scene
-
-
-def _walls(table: Table) -> Walls:
-    table.only(*WALLS, "lateral", noun="wall")
-    for name in table.data:
-        wall = table.table(name).only("pressure", "slip")
-        wall.number("pressure", None)
-        wall.flag("slip", False)
-        if name == "lateral" and "pressure" in wall.data:
-            raise wall.error("pressure", "the lateral walls have none; give it wall by wall (x_min = ...)")
-    try:
-        return Walls.from_mapping(table.data)
-    except InputError as error:
-        raise InputError(f"{table.source}: {error}") from None
-
-
-def _mesh(table: Table) -> MeshOptions:
-    table.only("unite_tolerance", "wall_tolerance")
-    options = MeshOptions(table.number("unite_tolerance", None), table.number("wall_tolerance", None))
-    for key, value in dataclasses.asdict(options).items():
-        if value is not None and not 0.0 <= value < 1.0:
-            raise table.error(key, f"must lie in [0, 1), not {value!r}: a fraction of a radius")
-    return options
-
-
-def _flow(table: Table) -> FlowOptions:
-    table.only("conductance", "alpha", "solver", "tolerance", "gravity")
-    conductance = read_conductance(table)
-    tolerance = table.number("tolerance", None)
-    if tolerance is not None and not 0.0 < tolerance < 1.0:
-        raise table.error("tolerance", f"must lie between 0 and 1, not {tolerance!r}: a bound on the relative residual")
-    return FlowOptions(
-        conductance=conductance,
-        solver=table.string("solver", "auto", choices=SOLVERS),
-        tolerance=tolerance,
-        gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
-    )
-
-
-def _output(table: Table, directory: Path) -> Output:
-    table.only("directory", "quantities", "vtk")
-    return Output(
-        directory=directory / table.string("directory", "results"),
-        quantities=table.strings("quantities", ("permeability",), choices=QUANTITIES),
-        vtk=table.flag("vtk", False),
-    )
-
-
-def _check_driven(scene: FlowScene, source: str) -> None:
-    """The walls drive what is asked for."""
-    asked = scene.output.quantities
-    held = [(name, wall) for name, wall in zip(WALLS, scene.walls, strict=True) if wall.pressure is not None]
-    if asked and not held:
-        raise InputError(
-            f"{source}: no wall has a pressure, and {', '.join(asked)} cannot be computed without. "
-            "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
-        )
-    if "permeability" in asked:
-        described = ", ".join(f"{name} at {wall.pressure:g} Pa" for name, wall in held)
-        axis = scene.walls.axis
-        pressures = scene.walls.pressures
-        if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
-            raise InputError(
-                f"{source}: permeability needs exactly two pressure walls, opposite each other and at "
-                f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
-            )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator
 
 from porefv.dem.dem import DEM
 from porefv.dem.growth import grow
@@ -22,41 +24,117 @@ from porefv.export.vtk_files import vtk_data_model
 from porefv.packing.box import WALLS, Box
 from porefv.packing.files.registry import EXTENSIONS, write_packing
 from porefv.packing.packing import Packing
-from porefv.scenes.shared_tables import read_material
-from porefv.scenes.table import SceneFile, Table
+from porefv.scenes.errors import refused
+from porefv.scenes.material_table import MaterialTable
+from porefv.scenes.shared_tables import BoxFromOriginTable
+from porefv.scenes.table import MadeFrom, Scene, Table
+from porefv.scenes.values import Fraction, Limits, Numbers, ScenePath, Unbalanced, Vector, Whole, key
 from porefv.system.progress import Progress
 from porefv.system.version import __version__
 
 METHODS = ("cloud", "growth", "settling")
 _WRITTEN = ("csv", "yade", "vtk")  # formats
+_SUFFIXES = tuple(suffix for suffix, name in EXTENSIONS.items() if name in _WRITTEN)
+
+
+def _pulls(gravity: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(gravity):
+        raise ValueError("must not be zero: grains settle by it")
+    return gravity
+
+
+def _of_known_format(path: Path) -> Path:
+    if path.suffix.lower() not in _SUFFIXES:
+        raise ValueError(f"the extension '{path.suffix}' tells no format to write; use one of {' '.join(_SUFFIXES)}")
+    return path
 
 
 @dataclass(frozen=True)
-class Cloud:
-    """As the parameters of `porefv.dem.cloud`."""
+class Grains:
+    """Number and sizes of the grains."""
 
-    porosity: float
-
-
-@dataclass(frozen=True)
-class Growth:
-    """As the parameters of `porefv.dem.grow`."""
-
-    stress: float | None
-    porosity: float | None
-    friction_angle: float | None
-    damping: float
-    unbalanced: float
+    number: int
+    sizes: UniformSizes | Grading
 
 
-@dataclass(frozen=True)
-class Settling:
-    """Porosity of the cloud that falls; gravity and damping of the DEM, and `unbalanced` as for `settle`."""
+class GrainsTable(Table):
+    """How many grains there are, and of which sizes."""
 
-    porosity: float
-    gravity: tuple[float, float, float]
-    damping: float
-    unbalanced: float
+    number: Annotated[int, Whole(least=1)] = key("number of grains")
+    ratio: Annotated[float, Limits(above=0.0, most=1.0)] = key(
+        "r_min / r_max, in (0, 1]. Radii are spread evenly between the two, by number", 0.5
+    )
+    diameters: Annotated[tuple[float, ...], Numbers("a list of finite numbers such as [1.0e-3, 2.0e-3]")] | None = key(
+        "instead of `ratio`: diameters of the sieves of a grading curve, positive, none below the one before. "
+        "Only their ratios matter, since grains are scaled to fill the box",
+        None,
+    )
+    passing: Annotated[tuple[float, ...], Numbers("a list of finite numbers such as [0.0, 1.0]")] | None = key(
+        "with `diameters`: fraction of the mass that passes each sieve, from 0.0 at the first to 1.0 at the last", None
+    )
+
+    @classmethod
+    def check_keys(cls, keys: Sequence[str]) -> None:
+        super().check_keys(keys)
+        graded = [name for name in ("diameters", "passing") if name in keys]
+        if graded and "ratio" in keys:
+            raise refused(f"{graded[0]} and ratio exclude each other: sizes come from the one or the other", graded[0])
+        for name in ("diameters", "passing"):
+            if graded and name not in keys:
+                raise refused("missing; give diameters and passing together in [grains]", name)
+
+    def make(self) -> Grains:
+        if self.diameters is None or self.passing is None:
+            return Grains(self.number, UniformSizes(self.ratio))
+        return Grains(self.number, Grading(self.diameters, self.passing))
+
+
+class Cloud(Table):
+    """Grains apart at random places."""
+
+    porosity: Fraction = key(
+        "porosity of the packing, between 0 and 1. About 0.65 is the least that random places reach"
+    )
+
+
+class Growth(Table):
+    """Grains that grow until they press on each other."""
+
+    stress: Annotated[float, Limits("must be a positive number of Pa (compression)", above=0.0)] | None = key(
+        "mean stress to reach, positive in compression", None, unit="Pa"
+    )
+    porosity: Fraction | None = key("porosity to reach. `stress`, `porosity` or both are required", None)
+    friction_angle: Annotated[float, Limits("must be an angle from 0 to 89 degrees", least=0.0, most=89.0)] | None = (
+        key(
+            "angle of friction between grains while they grow, 0 to 89. The lower it is, the denser the packing",
+            None,
+            unit="degrees",
+            shown="the material's",
+        )
+    )
+    damping: Fraction = key("local damping, between 0 and 1", 0.2)
+    unbalanced: Unbalanced = key(
+        "mean resultant force on a grain, over the mean contact force, at which the packing counts as at rest", 1.0e-3
+    )
+
+    @classmethod
+    def check_keys(cls, keys: Sequence[str]) -> None:
+        super().check_keys(keys)
+        if not {"stress", "porosity"} & set(keys):
+            raise refused("growth needs a stress in Pa, a porosity, or both", "stress")
+
+
+class Settling(Table):
+    """A cloud of grains that falls and comes to rest."""
+
+    porosity: Fraction = key("porosity of the cloud that falls, in the whole box", 0.75)
+    gravity: Annotated[Vector, AfterValidator(_pulls)] = key(
+        "acceleration of gravity, not zero", (0.0, 0.0, -9.81), unit="m/s²"
+    )
+    damping: Fraction = key("local damping, between 0 and 1", 0.3)
+    unbalanced: Unbalanced = key(
+        "mean resultant force on a grain, over the mean contact force, at which the packing counts as at rest", 1.0e-3
+    )
 
 
 class PackingProgress(Progress):
@@ -77,15 +155,13 @@ class PackingProgress(Progress):
         return f"porefv: {now.stage}  {seconds:.1f} s  {state}"
 
 
-@dataclass(frozen=True)
-class PackingScene(SceneFile):
-    """A packing to be made.
+class PackingScene(Scene):
+    """A packing of spheres to be made.
 
     Attributes
     ----------
-    number : int
-        Of grains.
-    sizes : UniformSizes or Grading
+    grains : Grains
+        Their number and sizes.
     box : Box
     material : Material
     method : Cloud, Growth or Settling
@@ -101,19 +177,48 @@ class PackingScene(SceneFile):
     >>> scene.make().porosity  # doctest: +SKIP
     """
 
-    number: int
-    sizes: UniformSizes | Grading
-    box: Box
-    material: Material
-    method: Cloud | Growth | Settling
-    seed: int
-    output: Path
-    path: Path | None = None
+    output: Annotated[ScenePath, AfterValidator(_of_known_format)] = key(
+        "the packing file to write: .csv, .txt .spheres .yade (Yade's text) or .vtk .vtp .vtu"
+    )
+    seed: Annotated[int, Whole(least=0)] = key(
+        "whole number from which random places and the order of sizes follow. The same seed makes the same packing on "
+        "the same number of threads of one machine",
+        0,
+    )
+    grains: Annotated[Grains, MadeFrom(GrainsTable)] = key("the table `[grains]`: how many, of which sizes", {})
+    box: Annotated[Box, MadeFrom(BoxFromOriginTable)] = key("the table `[box]`: the box that is filled", {})
+    material: Annotated[Material, MadeFrom(MaterialTable)] = key("the table `[material]`: what grains are made of", {})
+    cloud: Cloud | None = key(
+        "the table `[cloud]`: grains apart. Exactly one of `[cloud]`, `[growth]` and `[settling]` is required", None
+    )
+    growth: Growth | None = key("the table `[growth]`: grains that grow until they press", None)
+    settling: Settling | None = key("the table `[settling]`: grains that fall and come to rest", None)
 
     @classmethod
-    def from_table(cls, top: Table, directory: Path, path: Path | None = None) -> PackingScene:
-        """The scene that a table says; relative paths in it are relative to `directory`."""
-        return _scene(top, directory, path)
+    def check_keys(cls, keys: Sequence[str]) -> None:
+        super().check_keys(keys)
+        given = [name for name in keys if name in METHODS]
+        if not given:
+            raise refused("one of the tables [cloud], [growth] and [settling] is needed: it says how to pack", "growth")
+        if len(given) > 1:
+            raise refused(f"[{given[0]}] and [{given[1]}] exclude each other: a packing is made in one way", given[1])
+
+    @property
+    def number(self) -> int:
+        """Of grains."""
+        return self.grains.number
+
+    @property
+    def sizes(self) -> UniformSizes | Grading:
+        """Of the grains."""
+        return self.grains.sizes
+
+    @property
+    def method(self) -> Cloud | Growth | Settling:
+        """How the packing is made."""
+        method = self.cloud or self.growth or self.settling
+        assert method is not None  # the keys have been checked
+        return method
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -154,9 +259,7 @@ class PackingScene(SceneFile):
             packing = cloud(self.number, self.sizes, self.box, method.porosity, self.seed)
             return _described(packing, {"method": "cloud", "porosity": f"{packing.porosity:.6f}"}, self.seed)
         if isinstance(method, Growth):
-            dem = grow(
-                self.number, self.sizes, self.box, self.material, seed=self.seed, report=report, **asdict(method)
-            )
+            dem = grow(self.number, self.sizes, self.box, self.material, seed=self.seed, report=report, **dict(method))
             return self._measured(dem, "growth")
         start = cloud(self.number, self.sizes, self.box, method.porosity, self.seed)
         # As rough as the grains: on smooth walls a bed slides about long before it rests.
@@ -204,104 +307,3 @@ def _check_target(path: Path, force: bool) -> None:
         raise InputError(f"{path} exists. Choose another file, or replace it with {FORCE_OPTION}")
     if not (path.absolute().parent.is_dir() and os.access(path.absolute().parent, os.W_OK)):
         raise InputError(f"cannot write {path}: {path.parent} is not a directory that may be written to")
-
-
-# ---- reading ----------------------------------------------------------------------------------------------------
-
-
-def _scene(top: Table, directory: Path, path: Path | None) -> PackingScene:
-    top.only("output", "seed", "grains", "box", "material", *METHODS)
-    given = [name for name in top.data if name in METHODS]
-    if not given:
-        raise top.error("growth", "one of the tables [cloud], [growth] and [settling] is needed: it says how to pack")
-    if len(given) > 1:
-        raise top.error(given[1], f"[{given[0]}] and [{given[1]}] exclude each other: a packing is made in one way")
-    grains = top.table("grains").only("number", "ratio", "diameters", "passing")
-    return PackingScene(
-        number=grains.whole("number", least=1),
-        sizes=_sizes(grains),
-        box=top.table("box").box(lower=(0.0, 0.0, 0.0)),
-        material=read_material(top.table("material")),
-        method=_METHODS[given[0]](top.table(given[0])),
-        seed=top.whole("seed", least=0, default=0),
-        output=_output(top, directory),
-        path=path,
-    )
-
-
-def _sizes(table: Table) -> UniformSizes | Grading:
-    graded = [key for key in ("diameters", "passing") if key in table.data]
-    if graded and "ratio" in table.data:
-        raise table.error(graded[0], f"{graded[0]} and ratio exclude each other: sizes come from the one or the other")
-    if not graded:
-        return table.make(UniformSizes, ratio=table.number("ratio", 0.5))
-    return table.make(Grading, diameters=_numbers(table, "diameters"), passing=_numbers(table, "passing"))
-
-
-def _cloud(table: Table) -> Cloud:
-    table.only("porosity")
-    return Cloud(_part(table, "porosity"))
-
-
-def _growth(table: Table) -> Growth:
-    table.only("stress", "porosity", "friction_angle", "damping", "unbalanced")
-    stress, angle = table.number("stress", None), table.number("friction_angle", None)
-    if stress is None and "porosity" not in table.data:
-        raise table.error("stress", "growth needs a stress in Pa, a porosity, or both")
-    if stress is not None and stress <= 0.0:
-        raise table.error("stress", f"must be a positive number of Pa (compression), not {stress!r}")
-    if angle is not None and not 0.0 <= angle <= 89.0:
-        raise table.error("friction_angle", f"must be an angle from 0 to 89 degrees, not {angle!r}")
-    return Growth(
-        stress=stress,
-        porosity=_part(table, "porosity") if "porosity" in table.data else None,
-        friction_angle=angle,
-        damping=_part(table, "damping", 0.2),
-        unbalanced=_unbalanced(table),
-    )
-
-
-def _settling(table: Table) -> Settling:
-    table.only("porosity", "gravity", "damping", "unbalanced")
-    gravity = table.vector("gravity", (0.0, 0.0, -9.81))
-    if gravity == (0.0, 0.0, 0.0):
-        raise table.error("gravity", "must not be zero: grains settle by it")
-    return Settling(_part(table, "porosity", 0.75), gravity, _part(table, "damping", 0.3), _unbalanced(table))
-
-
-_METHODS: dict[str, Callable[[Table], Cloud | Growth | Settling]] = {
-    "cloud": _cloud,
-    "growth": _growth,
-    "settling": _settling,
-}
-
-
-def _output(top: Table, directory: Path) -> Path:
-    path = directory / top.string("output")
-    if EXTENSIONS.get(path.suffix.lower()) not in _WRITTEN:
-        extensions = " ".join(suffix for suffix, name in EXTENSIONS.items() if name in _WRITTEN)
-        raise top.error("output", f"the extension '{path.suffix}' tells no format to write; use one of {extensions}")
-    return path
-
-
-def _part(table: Table, key: str, *default: float) -> float:
-    value = table.number(key, *default)
-    if not 0.0 < value < 1.0:
-        raise table.error(key, f"must lie between 0 and 1, not {value!r}")
-    return value
-
-
-def _unbalanced(table: Table) -> float:
-    value = table.number("unbalanced", 1.0e-3)
-    if not 1.0e-8 <= value < 1.0:
-        raise table.error("unbalanced", f"must lie between 1e-8 and 1, not {value!r}")
-    return value
-
-
-def _numbers(table: Table, key: str) -> tuple[float, ...]:
-    values = table.data.get(key)
-    if values is None:
-        raise table.error(key, f"missing; give diameters and passing together in [{table.name}]")
-    if not isinstance(values, list | tuple):
-        raise table.error(key, f"expected a list of numbers, not {values!r}")
-    return tuple(values)

@@ -1,66 +1,142 @@
-"""Tables that several kinds of scene have: the packing file, the fluid, the conductance model, the grains' material."""
+"""Tables that several kinds of scene have: the packing file, the box, the fluid, the conductance model, the walls."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
+
+from pydantic import AfterValidator, GetCoreSchemaHandler
+from pydantic_core import core_schema
 
 from porefv.conductance.model import ConductanceModel
 from porefv.conductance.registry import MODELS, conductance_model
-from porefv.dem.material import Material
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
-from porefv.scenes.table import Table
+from porefv.packing.box import WALLS, Box
+from porefv.packing.files.registry import EXTENSIONS
+from porefv.scenes.errors import refused
+from porefv.scenes.table import OneOf, Table
+from porefv.scenes.values import Choice, Limits, ScenePath, Vector, key
+
+FORMATS = tuple(dict.fromkeys(EXTENSIONS.values()))
+CONDUCTANCES = ("auto", *MODELS)
+
+_Condition = TypeVar("_Condition")
 
 
-@dataclass(frozen=True)
-class PackingFile:
-    """The packing file; `format` as in `porefv.packing.files.read_packing`, by the extension if None."""
-
-    file: Path
-    format: str | None = None
-
-
-def read_packing_file(top: Table, directory: Path, *others: str) -> PackingFile:
-    """The key `packing`: a path, or a table that may have other keys."""
-    if isinstance(top.data.get("packing"), Mapping):
-        table = top.table("packing").only("file", "format", *others)
-        found = PackingFile(directory / table.string("file"), table.string("format", None))
-        key = "file"
-    else:
-        table, key = top, "packing"
-        found = PackingFile(directory / top.string("packing"))
+def _existing(path: Path) -> Path:
     try:
-        if not found.file.is_file():
-            what = "is not a file" if found.file.exists() else "does not exist"
-            raise table.error(key, f"{found.file} {what}; paths are relative to the scene file")
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "does not exist"
+            raise ValueError(f"{path} {what}; paths are relative to the scene file")
     except OSError as error:
-        raise table.error(key, f"{found.file} cannot be read: {error.strerror}") from None
-    return found
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from None
+    return path
 
 
-def read_fluid(table: Table) -> Fluid:
-    """The table [fluid]."""
-    table.only("viscosity", "density")
-    given = {key: table.number(key) for key in table.data}
-    try:
-        return Fluid(**given)
-    except InputError as error:
-        key = next((key for key in given if key in str(error)), "viscosity")
-        raise table.error(key, str(error)) from None
+ExistingFile = Annotated[ScenePath, AfterValidator(_existing)]
 
 
-def read_conductance(table: Table) -> ConductanceModel:
-    """The keys `conductance` and `alpha`."""
-    model = table.string("conductance", "auto", choices=("auto", *MODELS))
-    try:
-        return conductance_model(model, **({"alpha": table.number("alpha")} if "alpha" in table.data else {}))
-    except InputError as error:
-        raise table.error("alpha", str(error)) from None
+class PackingFile(Table):
+    """The packing file, and its format.
+
+    `format` is None if the extension of the file tells it.
+    """
+
+    file: ExistingFile = key("path of the packing file")
+    format: Annotated[str, Choice(FORMATS)] | None = key(
+        "format of the file: " + ", ".join(f'`"{name}"`' for name in FORMATS), None, shown="by the extension"
+    )
 
 
-def read_material(table: Table) -> Material:
-    """The table [material]."""
-    table.only("young", "stiffness_ratio", "friction_angle", "density")
-    return table.make(Material, **{key: table.number(key) for key in table.data})
+class PathOrTable:
+    """A field whose value is a table like [packing], or the path that is its key `file`."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        kinds = OneOf(
+            lambda value: "table" if isinstance(value, Mapping | Table) else "path",
+            path=Annotated[ExistingFile, AfterValidator(lambda path: source.model_construct(file=path))],
+            table=source,
+        )
+        return kinds.__get_pydantic_core_schema__(source, handler)
+
+
+class BoxTable(Table):
+    """The axis-aligned box whose six walls confine the packing."""
+
+    lower: Vector = key("corner where all coordinates are least", unit="m")
+    upper: Vector = key("corner where all coordinates are largest", unit="m")
+
+    def make(self) -> Box:
+        return Box(self.lower, self.upper)
+
+
+class BoxFromOriginTable(BoxTable):
+    """The axis-aligned box whose six walls confine the grains."""
+
+    lower: Vector = key("corner where all coordinates are least", (0.0, 0.0, 0.0), unit="m")
+
+
+class FluidTable(Table):
+    """The fluid in the pores, viscous and incompressible."""
+
+    viscosity: Annotated[float, Limits(above=0.0)] = key("dynamic viscosity, positive", Fluid.viscosity, unit="Pa s")
+    density: Annotated[float, Limits(least=0.0)] = key(
+        "density, for the hydraulic conductivity and for buoyancy", Fluid.density, unit="kg/m³"
+    )
+
+    def make(self) -> Fluid:
+        return Fluid(self.viscosity, self.density)
+
+
+class ConductanceTable(Table):
+    """A table with the keys of a conductance model."""
+
+    conductance: Annotated[str, Choice(CONDUCTANCES)] = key(
+        '[model of the conductance](theory.md#conductance) of throats: `"section-friction"`, which `"auto"` stands '
+        'for, or the paper\'s `"hydraulic-radius"` and `"effective-radius"`. The errors of each are on the page '
+        "[Accuracy](accuracy.md)",
+        "auto",
+    )
+    alpha: Annotated[float, Limits(above=0.0)] | None = key(
+        'shape factor of the hydraulic radius, positive. With any other model, `"auto"` among them, an error',
+        None,
+        shown="0.5",
+    )
+
+    def conductance_model(self) -> ConductanceModel:
+        """The model that the keys say."""
+        try:
+            return conductance_model(self.conductance, **({} if self.alpha is None else {"alpha": self.alpha}))
+        except InputError as error:
+            raise refused(str(error), "alpha") from None
+
+
+class LateralTable(Table):
+    """What all walls that are not named do to the fluid."""
+
+    advice: ClassVar[Mapping[str, str]] = {
+        "pressure": "the lateral walls have none; give it wall by wall (x_min = ...)"
+    }
+
+    slip: bool = key(
+        "whether the fluid slips along these walls, as along a plane of symmetry. If not, the walls drag it", False
+    )
+
+
+class SixWalls(Table, Generic[_Condition]):
+    """Conditions on walls, by name; None for the walls that are not named."""
+
+    noun: ClassVar[str] = "wall"
+
+    x_min: _Condition | None = key("the wall where x is least", None)
+    x_max: _Condition | None = key("the wall where x is largest", None)
+    y_min: _Condition | None = key("the wall where y is least", None)
+    y_max: _Condition | None = key("the wall where y is largest", None)
+    z_min: _Condition | None = key("the wall where z is least", None)
+    z_max: _Condition | None = key("the wall where z is largest", None)
+
+    def named(self) -> dict[str, _Condition]:
+        """The conditions on the walls that are named."""
+        return {name: condition for name in WALLS if (condition := getattr(self, name)) is not None}

@@ -19,7 +19,8 @@ from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, ComputationError, InputError
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, Rest, SimulationScene, Stage
+from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScene
+from porefv.scenes.stage import Rest, Stage
 from porefv.simulation import measurements
 from porefv.simulation.frames import Frames
 from porefv.simulation.progress import RunState, SimulationProgress
@@ -273,7 +274,7 @@ class _Run:
         # Pressures are piezometric: the hydrostatic part of the fluid's force is that on the volume of a grain.
         volumes = 4.0 / 3.0 * np.pi * dem.radii**3
         dem.apply(-fluid.density * volumes[:, None] * dem.gravity)
-        self.coupling = Coupling(dem, walls, fluid, options.conductance, **options.given)
+        self.coupling = Coupling(dem, walls, fluid, options.conductance, **options.parameters)
 
     def _follow(self, k: int) -> None:
         """Take a stage's steps to its end."""
