@@ -227,11 +227,23 @@ def test_terminal_shows_stages_and_is_left_clean():
             time.sleep(0.02)
     text = terminal.getvalue()
     assert text.startswith("porefv: compiling\n")
-    assert "[....................] 1/2 reading" in text
-    assert "[##########..........] 2/2 writing" in text
-    assert text.endswith("\r\x1b[K")
+    assert "1/2 reading" in text and "2/2 writing" in text
+    assert text.endswith("\x1b[2K")
     assert list(progress.seconds) == ["reading", "writing"]
     assert all(seconds > 0.01 for seconds in progress.seconds.values())
+
+
+def test_a_stage_shows_its_state_and_which_part_of_it_is_done():
+    terminal = Terminal()
+    progress = Progress(["consolidation"], terminal)
+    progress.show("of no stage")
+    with progress.stage("consolidation"):
+        for part in (0.25, 0.5, 1.0):
+            progress.show(f"part {part}", part)
+            time.sleep(0.15)
+    text = terminal.getvalue()
+    assert all(f"part {part}" in text for part in (0.25, 0.5)) and "of no stage" not in text
+    assert "\x1b[36m00:00" in text  # what remains by the clock
 
 
 @pytest.mark.parametrize("stream, quiet", [(io.StringIO(), False), (Terminal(), True)])

@@ -9,7 +9,8 @@ from porefv.cli.program import main
 from porefv.errors import ComputationError, InputError
 from porefv.packing.packing import Packing
 from porefv.scenes import packing_scene
-from porefv.scenes.packing_scene import PackingProgress, PackingScene
+from porefv.scenes.packing_scene import PackingScene
+from porefv.system.progress import Progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -169,13 +170,13 @@ def test_a_scene_must_say_how_to_pack(scene):
 # ---- progress ----------
 
 
-def test_the_terminal_shows_stress_porosity_and_unbalanced_force():
-    progress = PackingProgress(("packing", "writing"), quiet=True)
+def test_the_terminal_shows_stress_porosity_and_unbalanced_force(monkeypatch):
+    shown = []
+    monkeypatch.setattr(Progress, "show", lambda progress, state: shown.append(state))
     scene = PackingScene.from_mapping(tomllib.loads(GROWTH.replace("number = 50", "number = 30")))
-    scene.make(progress)
-    line = progress.line("packing", 100.0)
-    assert re.fullmatch(r"porefv: pressing  100\.0 s  stress \S+ Pa  porosity 0\.\d{4}  unbalanced \S+", line)
-    assert len(line) < 80
+    scene.make(Progress(("packing", "writing"), quiet=True))
+    assert re.fullmatch(r"pressing \S+ Pa, n 0\.\d{4}, unbalanced \S+", shown[-1])
+    assert len(shown[-1]) < 50
 
 
 # ---- examples and documentation ----------

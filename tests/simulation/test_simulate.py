@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,9 @@ from porefv.packing.box import WALLS
 from porefv.scenes.simulation_scene import SimulationScene
 from porefv.simulation import measurements, series, simulate
 from porefv.simulation.measurements import layer_stresses
-from porefv.simulation.progress import RunState, SimulationProgress, duration
 from porefv.simulation.run_record import read_record
 from porefv.simulation.series import read_profiles, read_series
+from porefv.system.progress import Progress
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = [ROOT / "data" / "scenes" / f"{name}.toml" for name in ("oedometer", "triaxial", "permeameter")]
@@ -391,16 +392,31 @@ def test_a_scene_needs_stages(path):
 # ---- progress, pictures, examples, documentation ----------
 
 
-def test_the_terminal_shows_time_what_remains_energy_and_imbalance():
-    progress = SimulationProgress(("a stage",), quiet=True)
-    progress.show(RunState(0.1, 0.5, 1e-3, 1e-9, 1e-2))
-    progress.show(RunState(0.2, 0.5, 1e-3, 1e-9, 1e-2))
-    line = progress.line("consolidation", 3.0)
-    assert re.fullmatch(r"porefv: consolidation  0\.2 of 0\.5 s, \d+ s left  kinetic 1e-03  imbalance 1e-09", line)
-    assert len(line) < 80
-    progress.show(RunState(0.2, None, 1e-3, 1e-9, 1e-2))
-    assert "0.2 s, unbalanced 1e-02" in progress.line("rest", 3.0)
-    assert [duration(x) for x in (42.0, 200.0, 9000.0)] == ["42 s", "3 min", "2.5 h"]
+class Shown(Progress):
+    """Keeps what is shown."""
+
+    draws = True
+
+    def __init__(self):
+        super().__init__(quiet=True)
+        self.states, self.draws = [], True
+
+    def show(self, state, part=None):
+        self.states.append((state, part))
+
+    @contextmanager
+    def stage(self, name):
+        yield
+
+
+def test_the_terminal_shows_how_much_is_done_energy_and_imbalance(path):
+    path.write_text(WET)
+    shown = Shown()
+    simulate.run(SimulationScene.read(path), progress=shown)
+    states, parts = zip(*shown.states, strict=True)
+    assert all(re.fullmatch(r"(unbalanced \S+  )?kinetic \S+(  imbalance \S+)?", state) for state in states)
+    assert any("unbalanced" in state for state in states) == any(part is None for part in parts)
+    assert max(part for part in parts if part is not None) == pytest.approx(1.0, abs=0.02)  # a step may be longer
 
 
 def test_plot_draws_series(path):

@@ -25,12 +25,13 @@ def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from porefv.cli.compilation import announce_compilation
     from porefv.dem import motion
-    from porefv.scenes.packing_scene import PackingProgress, PackingScene
+    from porefv.scenes.packing_scene import PackingScene
+    from porefv.system.progress import Progress
     from porefv.system.threads import limit_threads
 
     scene = PackingScene.read(options.scene)
     limit_threads(options.threads)
-    progress = PackingProgress(scene.stages, quiet=options.quiet)
+    progress = Progress(scene.stages, quiet=options.quiet)
     announce_compilation(progress, motion.advance, "half a minute")
     packing = scene.pack(force=options.force, progress=progress)
     if not options.quiet:

@@ -27,15 +27,15 @@ def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from porefv.scenes.simulation_scene import SimulationScene
     from porefv.simulation import simulate
-    from porefv.simulation.progress import SimulationProgress
     from porefv.simulation.run_record import read_record
+    from porefv.system.progress import Progress
     from porefv.system.threads import limit_threads
 
     if options.resume and options.force:
         raise InputError("--resume goes on with results that exist, --force replaces them: give one of the two")
     scene = SimulationScene.read(options.scene)
     limit_threads(options.threads)
-    progress = SimulationProgress([stage.name for stage in scene.stages], quiet=options.quiet)
+    progress = Progress([stage.name for stage in scene.stages], quiet=options.quiet)
     directory = simulate.run(scene, force=options.force, resume=options.resume, progress=progress)
     if not options.quiet:
         print(outcome_text(read_record(directory), directory))

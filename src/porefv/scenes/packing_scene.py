@@ -137,24 +137,6 @@ class Settling(Table):
     )
 
 
-class PackingProgress(Progress):
-    """Progress that shows the state of the grains, once there is one, in the place of the bar."""
-
-    state: PackingState | None = None
-
-    def show(self, state: PackingState) -> None:
-        """Take a state to be drawn."""
-        self.state = state
-
-    def line(self, name: str, seconds: float) -> str:
-        now = self.state
-        if now is None:
-            return super().line(name, seconds)
-        # Not above 80 columns: what is beyond is cut off.
-        state = f"stress {now.stress:.4g} Pa  porosity {now.porosity:.4f}  unbalanced {now.unbalanced:.2g}"
-        return f"porefv: {now.stage}  {seconds:.1f} s  {state}"
-
-
 class PackingScene(Scene):
     """A packing of spheres to be made.
 
@@ -225,14 +207,14 @@ class PackingScene(Scene):
         """Stages of `pack`, in order."""
         return ("packing", "writing")
 
-    def pack(self, *, force: bool = False, progress: PackingProgress | None = None) -> Packing:
+    def pack(self, *, force: bool = False, progress: Progress | None = None) -> Packing:
         """Make the packing, and write its file with what it is and how it was made.
 
         Parameters
         ----------
         force : bool
             Replace a file that exists.
-        progress : PackingProgress, optional
+        progress : Progress, optional
             Its stages are those of `stages`.
 
         Raises
@@ -243,17 +225,22 @@ class PackingScene(Scene):
             If the packing does not come out; nothing is written.
         """
         _check_target(self.output, force)
-        progress = progress or PackingProgress(self.stages, quiet=True)
+        progress = progress or Progress(self.stages, quiet=True)
         with progress.stage("packing"):
             packing = self.make(progress)
-        progress.state = None
         with progress.stage("writing"):
             write_packing(packing, self.output)
         return packing
 
-    def make(self, progress: PackingProgress | None = None) -> Packing:
+    def make(self, progress: Progress | None = None) -> Packing:
         """The packing, with its metadata; nothing is written."""
-        report = progress.show if progress else None
+
+        def report(state: PackingState) -> None:
+            if progress is not None:
+                progress.show(
+                    f"{state.stage} {state.stress:.4g} Pa, n {state.porosity:.4f}, unbalanced {state.unbalanced:.0e}"
+                )
+
         method = self.method
         if isinstance(method, Cloud):
             packing = cloud(self.number, self.sizes, self.box, method.porosity, self.seed)

@@ -23,7 +23,6 @@ from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScen
 from porefv.scenes.stage import Rest, Stage
 from porefv.simulation import measurements
 from porefv.simulation.frames import Frames
-from porefv.simulation.progress import RunState, SimulationProgress
 from porefv.simulation.run_record import (
     FRAMES,
     RunRecord,
@@ -34,6 +33,7 @@ from porefv.simulation.run_record import (
     read_record,
 )
 from porefv.simulation.series import PROFILES, SERIES, Series, require_parquet, write_parquet
+from porefv.system.progress import Progress
 from porefv.system.threads import threads
 
 # Most steps at once, and between two looks at whether grains are at rest.
@@ -42,9 +42,7 @@ _STRIDE = 100
 _MOST = 200_000
 
 
-def run(
-    scene: SimulationScene, *, force: bool = False, resume: bool = False, progress: SimulationProgress | None = None
-) -> Path:
+def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, progress: Progress | None = None) -> Path:
     """Go through the stages of a scene.
 
     Parameters
@@ -56,7 +54,7 @@ def run(
         Go on from the last checkpoint, as if the run had not been stopped: to the last bit, on the same kind of
         processor with the same versions. A run that is complete is left as it is. Stages that had not begun may
         have been changed in the scene, or added.
-    progress : SimulationProgress, optional
+    progress : Progress, optional
 
     Returns
     -------
@@ -72,7 +70,7 @@ def run(
     KeyboardInterrupt
         When interrupted: at the end of some steps, after a checkpoint; at once when interrupted again.
     """
-    progress = progress or SimulationProgress(quiet=True)
+    progress = progress or Progress(quiet=True)
     directory = scene.output.directory
     if scene.output.parquet:
         require_parquet()
@@ -196,7 +194,7 @@ class _Run:
         record: RunRecord,
         dem: DEM,
         coupling: Coupling | None,
-        progress: SimulationProgress,
+        progress: Progress,
     ):
         self.scene, self.record, self.dem, self.coupling, self.progress = scene, record, dem, coupling, progress
         self.directory = scene.output.directory
@@ -233,7 +231,6 @@ class _Run:
             with self.progress.stage(stages[begun - 1].name):
                 self._follow(begun - 1)
         for k in range(begun, len(stages)):
-            self.progress.begin()
             with self.progress.stage(stages[k].name):
                 self._enter(k)
                 self._follow(k)
@@ -383,16 +380,15 @@ class _Run:
     def _show(self, k: int, residual: float) -> None:
         if not self.progress.draws:
             return
-        stage, energies = self.scene.stages[k], self.dem.energies
-        self.progress.show(
-            RunState(
-                time=self.dem.time,
-                total=self.record.spans[k].begin + stage.end if not isinstance(stage.end, Rest) else None,
-                kinetic=energies.kinetic / energies.stored if energies.stored else 0.0,
-                imbalance=self.coupling.power.imbalance if self.coupling else residual,
-                unbalanced=measurements.unbalanced(self.dem, self.coupling),
-            )
-        )
+        stage, span, energies = self.scene.stages[k], self.record.spans[k], self.dem.energies
+        imbalance = self.coupling.power.imbalance if self.coupling else residual
+        state, part = "", None
+        if isinstance(stage.end, Rest):
+            state = f"unbalanced {measurements.unbalanced(self.dem, self.coupling):.0e}  "
+        else:
+            part = (self.dem.time - span.begin) / stage.end
+        state += f"kinetic {energies.kinetic / energies.stored if energies.stored else 0.0:.0e}"
+        self.progress.show(state if math.isnan(imbalance) else f"{state}  imbalance {imbalance:.0e}", part)
 
     # ---- checkpoints --------------------------------------------------------------------------------------------
 

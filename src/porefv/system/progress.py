@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from threading import Event, Thread
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-_BAR = 20  # characters
-_PERIOD = 0.1  # s between two drawings
+from porefv.system.timer import Timer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
 
 
 class Progress:
@@ -30,6 +29,8 @@ class Progress:
     ----------
     seconds : dict of str to float
         Wall time of each stage that has ended [s].
+    draws : bool
+        Whether anything is drawn.
 
     Examples
     --------
@@ -44,44 +45,55 @@ class Progress:
         self.stages = tuple(stages)
         self.seconds: dict[str, float] = {}
         self._stream = sys.stderr if stream is None else stream
-        self._draws = not quiet and self._stream.isatty()
+        self.draws = not quiet and self._stream.isatty()
+        self._bar: Bar | None = None  # of the stage that lasts
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time a stage, and show it while it lasts."""
-        begin = time.perf_counter()
-        done = Event()
-        painter = Thread(target=self._paint, args=(name, begin, done), daemon=True)
-        if self._draws:
-            painter.start()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
-            if self._draws:
-                done.set()
-                painter.join()
-                self._stream.write("\r\x1b[K")
-                self._stream.flush()
+        with Timer(self.seconds, name):
+            if not self.draws:
+                yield
+                return
+            # A compiled kernel may hold the interpreter's lock: the line then stands still, but it stands.
+            with self._new_bar() as self._bar:
+                title = f"{self.stages.index(name) + 1}/{len(self.stages)} {name}" if name in self.stages else name
+                self._bar.add_task(title, total=None, state="")
+                try:
+                    yield
+                finally:
+                    self._bar = None
+
+    def show(self, state: str, part: float | None = None) -> None:
+        """Show what is known of the stage that lasts, and which part of it is done if that is known."""
+        if self._bar is not None:
+            task = self._bar.task_ids[0]
+            if part is not None and self._bar.tasks[0].total is None:
+                self._bar.reset(task, total=1.0 - part)  # what remains by the clock is told from what is done from here
+                self._bar.tasks[0].fields["begin"] = part
+            begin = self._bar.tasks[0].fields.get("begin", 0.0)
+            self._bar.update(task, state=state, completed=None if part is None else part - begin)
 
     def note(self, text: str) -> None:
-        """A line that stays on the terminal; nothing in a log."""
-        if self._draws:
+        """Write a line that stays on the terminal; nothing in a log."""
+        if self.draws:
             self._stream.write(f"porefv: {text}\n")
             self._stream.flush()
 
-    def _paint(self, name: str, begin: float, done: Event) -> None:
-        # A compiled kernel may hold the interpreter's lock: the line then stands still, but it stands.
-        while True:
-            line = self.line(name, time.perf_counter() - begin)
-            self._stream.write("\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1])
-            self._stream.flush()
-            if done.wait(_PERIOD):
-                return
+    def _new_bar(self) -> Bar:
+        # rich is loaded for a terminal only. It does not take standard output and error into its hands.
+        from rich.console import Console
+        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bar
+        from rich.table import Column
 
-    def line(self, name: str, seconds: float) -> str:
-        if name not in self.stages:
-            return f"porefv: {name}  {seconds:.1f} s"
-        number, total = self.stages.index(name), len(self.stages)
-        filled = _BAR * number // total
-        return f"porefv: [{'#' * filled}{'.' * (_BAR - filled)}] {number + 1}/{total} {name}  {seconds:.1f} s"
+        # Where a terminal is narrow, the state gives way.
+        columns = (
+            TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True)),
+            BarColumn(bar_width=8, table_column=Column(min_width=8)),
+            TimeElapsedColumn(table_column=Column(min_width=7)),
+            TimeRemainingColumn(compact=True, table_column=Column(min_width=5)),
+            TextColumn("{task.fields[state]}", markup=False, table_column=Column(no_wrap=True, ratio=1)),
+        )
+        console = Console(file=self._stream, highlight=False)
+        return Bar(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
