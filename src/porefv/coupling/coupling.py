@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,6 +25,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
 from porefv.system.threads import threads_for
+from porefv.system.timer import Timer
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
@@ -175,7 +174,7 @@ class Coupling:
             self._step()
 
     def _step(self) -> None:
-        with self._timed("grains"):
+        with Timer(self.effort.seconds, "grains"):
             predicted, wall_speeds, _, wall_mobilities = self.grains.predict()
             self._refuse_no_way_out(wall_speeds, wall_mobilities)
             moves = self._moves
@@ -184,7 +183,7 @@ class Coupling:
             else:
                 moves[:] = self._velocities()
             moves[_WALL_ROWS, WALL_AXES] = WALL_SENSES * wall_speeds
-        with self._timed("pressure"):
+        with Timer(self.effort.seconds, "pressure"):
             # Half of what the last step changed: all of it would pass its noise on.
             guess, product = self._pressure + 0.5 * self._rate, None
             steady = self.equation.is_steady(wall_mobilities)
@@ -203,10 +202,10 @@ class Coupling:
             else:
                 self._products = np.zeros((2, 0))
             self._pressure, self._fresh = pressure, False
-        with self._timed("forces"):
+        with Timer(self.effort.seconds, "forces"):
             forces = self.equation.forces(pressure)
             thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
-        with self._timed("grains"):
+        with Timer(self.effort.seconds, "grains"):
             self.grains.correct(forces[:-6], thrusts)
         self.effort.steps += 1
         self.effort.iterations += iterations
@@ -250,7 +249,7 @@ class Coupling:
 
     def _set_out(self, packing: Packing) -> None:
         """Make the mesh of a packing, its conductances and its exchange with the grains, without pressures."""
-        with self._timed("mesh"):
+        with Timer(self.effort.seconds, "mesh"):
             grains, slip, pressures = self.grains, self.walls.slip, self.walls.pressures
             mesh = PoreMesh(packing)
             conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
@@ -341,12 +340,6 @@ class Coupling:
     def power(self) -> Power:
         """Where the fluid's power went over the last step."""
         return self.equation.power(self._pressure, self._velocities())
-
-    @contextmanager
-    def _timed(self, part: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        yield
-        self.effort.seconds[part] += time.perf_counter() - begin
 
     def __repr__(self) -> str:
         return f"Coupling({self.grains!r}, {self.scheme}, {self.mesh.n_pores} pores)"

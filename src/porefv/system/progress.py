@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shutil
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 from typing import TextIO
+
+from porefv.system.timer import Timer
 
 _BAR = 20  # characters
 _PERIOD = 0.1  # s between two drawings
@@ -49,15 +50,14 @@ class Progress:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time a stage, and show it while it lasts."""
-        begin = time.perf_counter()
         done = Event()
-        painter = Thread(target=self._paint, args=(name, begin, done), daemon=True)
-        if self._draws:
-            painter.start()
         try:
-            yield
+            with Timer(self.seconds, name) as timer:
+                painter = Thread(target=self._paint, args=(name, timer, done), daemon=True)
+                if self._draws:
+                    painter.start()
+                yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
             if self._draws:
                 done.set()
                 painter.join()
@@ -70,10 +70,10 @@ class Progress:
             self._stream.write(f"porefv: {text}\n")
             self._stream.flush()
 
-    def _paint(self, name: str, begin: float, done: Event) -> None:
+    def _paint(self, name: str, timer: Timer, done: Event) -> None:
         # A compiled kernel may hold the interpreter's lock: the line then stands still, but it stands.
         while True:
-            line = self.line(name, time.perf_counter() - begin)
+            line = self.line(name, timer.elapsed)
             self._stream.write("\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1])
             self._stream.flush()
             if done.wait(_PERIOD):
