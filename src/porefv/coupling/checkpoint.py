@@ -6,24 +6,22 @@ the fluid adds: the packing its mesh was made from, from which the same mesh is 
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from porefv import __version__
 from porefv.conductance.registry import conductance_model
 from porefv.coupling.coupling import Coupling, Effort
 from porefv.dem import checkpoint as grains_checkpoint
+from porefv.dem import state_files
 from porefv.dem.dem import DEM
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
-from porefv.system.atomic_files import atomic_write
 
 FORMAT, VERSION = "porefv.coupling", 1
 
@@ -43,9 +41,6 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
     packing = coupling.mesh.packing
     assert packing.box is not None  # a mesh has seen to it
     header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "porefv": __version__,
         "walls": {name: asdict(wall) for name, wall in zip(WALLS, coupling.walls, strict=True)},
         "fluid": asdict(coupling.fluid),
         "conductance": {"name": coupling.conductance.name, **vars(coupling.conductance)},
@@ -56,19 +51,18 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
         "drag_number": coupling.drag_number,
     }
     grains = grains_checkpoint.pack(coupling.grains, path)
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            header=np.array(json.dumps(header)),
-            **{f"grains_{name}": array for name, array in grains.items()},
-            mesh_centres=packing.centres,
-            mesh_radii=packing.radii,
-            mesh_box=np.stack([packing.box.lower, packing.box.upper]),
-            factor_mobilities=coupling.equation.factor_mobilities,
-            pressure=coupling._pressure,
-            rate=coupling._rate,
-            products=coupling._products,
-        )
+    content = {
+        "header": state_files.header(FORMAT, VERSION, header),
+        **{f"grains_{name}": array for name, array in grains.items()},
+        "mesh_centres": packing.centres,
+        "mesh_radii": packing.radii,
+        "mesh_box": np.stack([packing.box.lower, packing.box.upper]),
+        "factor_mobilities": coupling.equation.factor_mobilities,
+        "pressure": coupling._pressure,
+        "rate": coupling._rate,
+        "products": coupling._products,
+    }
+    state_files.write(path, content)
 
 
 def load(path: str | PathLike[str]) -> Coupling:
@@ -81,9 +75,10 @@ def load(path: str | PathLike[str]) -> Coupling:
     InputError
         If the file cannot be read, is damaged, of another program, or of a newer format.
     """
-    return grains_checkpoint.build(
-        grains_checkpoint.read(path), path, FORMAT, VERSION, lambda header, content: _build(header, content, path)
-    )
+    content = state_files.read(path, FORMAT)
+    header = state_files.header_of(content, path, FORMAT, VERSION)
+    with state_files.damage_refused(path, FORMAT):
+        return _build(header, content, path)
 
 
 def _build(header: dict[str, Any], content: dict[str, np.ndarray], path: str | PathLike[str]) -> Coupling:
