@@ -133,8 +133,6 @@ class CoupledPressure:
         self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
         faces = mesh.wall_faces
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
-        # What walls yielded when the factor was made; empty before.
-        self.factor_mobilities = np.zeros(0)
         self._factor: ApproximateCholesky | SparseFactor | None = None
         self.set_pressures(pressures)
 
@@ -154,6 +152,10 @@ class CoupledPressure:
         self._of_held.spread(self._held, self._held_forces)
 
     # ---- solving ------------------------------------------------------------------------------------------------
+
+    def prepare(self, wall_mobilities: np.ndarray) -> None:
+        """Make the preconditioner, for walls that yield so much (6,) [m/(s N)]; `solve` does where it is not made."""
+        self._factor = self._make_factor(wall_mobilities)
 
     def solve(
         self,
@@ -184,9 +186,8 @@ class CoupledPressure:
             If it is not reached.
         """
         if self._factor is None:
-            if len(self.factor_mobilities) == 0:
-                self.factor_mobilities = wall_mobilities.copy()
-            self._factor = self._make_factor(self.factor_mobilities)
+            self.prepare(wall_mobilities)
+        assert self._factor is not None
         mobilities = Mobilities(self.mobilities, wall_mobilities)
         moved = velocities.copy()
         _yield(mobilities, self._held_forces, moved)
@@ -330,22 +331,18 @@ class _PowerRule:
     """
 
     def __init__(self, x: np.ndarray, rhs: np.ndarray, r: np.ndarray, weights: np.ndarray, tolerance: float):
-        self._x, self._rhs, self._r, self._weights, self._tolerance = x, rhs, r, weights, tolerance
-        self._size = _weighted_square(r, weights)
-        self._bound = self._power()
+        self._arrays, self._part = (x, rhs, r, weights), tolerance**2
+        self._power, self._size = _power_and_size(*self._arrays)
         self._wrong = np.inf
-
-    def _power(self) -> float:
-        return self._tolerance**2 * abs(_dot(self._x, self._rhs))
 
     def met_before(self, rz: float) -> bool:
         self._wrong = rz
-        return rz <= max(self._bound, 1e-300)
+        return rz <= max(self._part * self._power, 1e-300)
 
     def met_after(self, iterations: int, lost: float) -> bool:
-        before, self._size = self._size, _weighted_square(self._r, self._weights)
-        self._bound = self._power()
-        return self._wrong * self._size / before <= self._bound
+        before = self._size
+        self._power, self._size = _power_and_size(*self._arrays)
+        return self._wrong * self._size / before <= self._part * self._power
 
 
 @njit(cache=True, nogil=True)
@@ -401,6 +398,12 @@ def _dot(a, b):
     for i in range(a.shape[0]):
         total += a[i] * b[i]
     return total
+
+
+@njit(cache=True, nogil=True)
+def _power_and_size(x, rhs, r, weights):
+    """|x·b| and Σ w r²."""
+    return abs(_dot(x, rhs)), _weighted_square(r, weights)
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
