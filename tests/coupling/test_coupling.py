@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from porefv import Box, Fluid, Packing, PoreFlow, PoreMesh, Wall, Walls
 from porefv.conductance.registry import MODELS
 from porefv.conductance.section_friction.model import SectionFriction
-from porefv.coupling import checkpoint
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.exchange import Exchange
 from porefv.dem.dem import DEM
@@ -284,42 +283,6 @@ def test_pressures_go_on_when_the_mesh_is_made_anew(sample):
     mean = np.average(before, weights=volumes)
     after = np.average(coupling.cell_pressure, weights=coupling.mesh.cell_volumes)
     assert_allclose(after, mean, rtol=0.02)
-
-
-def test_a_resumed_run_is_the_run_to_the_last_bit(sample, tmp_path):
-    dem = sample(6e3)
-    coupling = Coupling(dem, DRAINED, Fluid(viscosity=100.0), renewal=1e-3)
-    coupling.run(40)
-    checkpoint.save(coupling, tmp_path / "state.npz")
-    again = checkpoint.load(tmp_path / "state.npz")
-    coupling.run(60)
-    again.run(60)
-    assert coupling.effort.meshes > 2
-    assert (coupling.effort.iterations, coupling.effort.meshes) == (again.effort.iterations, again.effort.meshes)
-    assert_array_equal(coupling.pressure, again.pressure)
-    assert_array_equal(dem.positions, again.grains.positions)
-    assert_array_equal(dem.velocities, again.grains.velocities)
-
-
-def test_any_model_of_conductance_is_resumed(sample, tmp_path):
-    coupling = Coupling(sample(6e3), DRAINED, Fluid(viscosity=100.0), MODELS["section-friction"](friction=2.5))
-    coupling.run(5)
-    checkpoint.save(coupling, tmp_path / "state.npz")
-    again = checkpoint.load(tmp_path / "state.npz")
-    assert again.conductance == coupling.conductance
-    coupling.run(5)
-    again.run(5)
-    assert_array_equal(coupling.pressure, again.pressure)
-
-
-def test_damaged_checkpoints_are_refused(sample, tmp_path):
-    path = tmp_path / "state.npz"
-    checkpoint.save(Coupling(sample(6e3), DRAINED), path)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 0x10
-    path.write_bytes(content)
-    with pytest.raises(InputError, match="damaged"):
-        checkpoint.load(path)
 
 
 def test_pressures_of_walls_may_change(sample):

@@ -5,7 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from porefv import Box, ComputationError, InputError, Packing
+from porefv.dem.contacts import StepParameters, grain_contacts
 from porefv.dem.dem import DEM
+from porefv.dem.grain_state import GrainPairs, Grains
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 
@@ -84,17 +86,22 @@ def test_an_oblique_impact_that_slides_throughout_has_the_impulses_of_coulomb():
 @pytest.mark.parametrize("spin", [[0.0, 0.0, 3.0], [2.0, 1.0, 0.5]])
 def test_tangential_force_turns_with_a_pair_that_turns_as_one(spin):
     # A rigid rotation makes no slip: the tangential force keeps its size and turns along.
-    from porefv.dem.contacts import grain_contacts
-
     spin = np.array(spin)
-    state = np.zeros((2, 10))
-    state[:, 3] = 0.1
-    state[:, 7:] = spin
+    grains = Grains(np.zeros((2, 10)), inverse_mass=np.ones(2), inverse_inertia=np.ones(2))
+    grains.motion[:, 3] = 0.1
+    grains.motion[:, 7:] = spin
     branch, shear0 = np.array([0.19, 0.0, 0.0]), np.array([0.0, 1.0e-3, 0.5e-3])
-    starts, others = np.array([0, 1, 1]), np.array([1], np.int32)
-    stiffness = np.array([1.0e-7])  # next to none: what is there only turns
-    shear, touching = shear0[None].copy(), np.array([True])
+    pairs = GrainPairs(
+        grains=np.array([[0, 1]], np.int32),
+        starts=np.array([0, 1, 1]),
+        others=np.array([1], np.int32),
+        stiffness=np.array([1.0e-7]),  # next to none: what is there only turns
+        shear=shear0[None].copy(),
+        touching=np.array([True]),
+        ranges=np.array([0, 2]),
+    )
     dt, steps = 1.0e-4, 20_000
+    parameters = StepParameters(dt, 0.5, friction=1e12, gravity=np.zeros(3), damping=0.0, gain=0.0, fastest=np.inf)
     rate = np.sqrt(spin @ spin)
     axis = spin / rate
 
@@ -104,10 +111,11 @@ def test_tangential_force_turns_with_a_pair_that_turns_as_one(spin):
     for step in range(1, steps + 1):
         # Velocities at the half step, places at the whole.
         half, whole = turned(branch, rate * dt * (step - 0.5)), turned(branch, rate * dt * step)
-        state[1, :3] = whole
-        state[1, 4:7] = np.cross(spin, half)
-        grain_contacts(0, 1, state, starts, others, stiffness, 0.5, 1e12, dt, shear, touching, np.zeros((2, 6)))
+        grains.motion[1, :3] = whole
+        grains.motion[1, 4:7] = np.cross(spin, half)
+        grain_contacts(0, 1, parameters, grains, pairs, np.zeros((2, 6)))
     # To first order in the 3e-4 that it turns in a step.
+    shear = pairs.shear
     assert_allclose(shear[0], turned(shear0, rate * dt * steps), atol=1e-3 * np.abs(shear0).max())
     assert_allclose(shear[0] @ shear[0], shear0 @ shear0, rtol=1e-6)
 

@@ -1,31 +1,30 @@
 """State of a coupled run on disk: a run that is loaded goes on to the last bit as if it had never been stopped.
 
-A checkpoint is one .npz file: that of the grains (`porefv.dem.checkpoint`), its arrays called `grains_...`, and what
-the fluid adds: the packing its mesh was made from, from which the same mesh is made again, and the pressures on it.
+A checkpoint is one .npz file (`porefv.dem.state_files`): that of the grains (`porefv.dem.checkpoint`), its arrays
+called `dem_...`; the entries of the `CouplingState`, with the packing from which the same mesh is made again; and in
+the header the walls, the fluid, the settings and the conductance model. Of a model that is not one of the package, the
+file has the name and the class alone: who loads it gives the model.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
-import numpy as np
-
-from porefv.conductance.registry import conductance_model
-from porefv.coupling.coupling import Coupling, Effort
+from porefv.conductance.model import ConductanceModel, ensure_model
+from porefv.conductance.registry import MODELS, conductance_model
+from porefv.coupling.coupling import Coupling, CouplingSettings, Effort
+from porefv.coupling.coupling_state import CouplingState
 from porefv.dem import checkpoint as grains_checkpoint
+from porefv.dem import state_files
 from porefv.dem.dem import DEM
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.walls import Walls
-from porefv.packing.box import WALLS, Box
-from porefv.packing.packing import Packing
-from porefv.system.atomic_files import atomic_write
-from porefv.system.version import __version__
+from porefv.packing.box import WALLS
 
-FORMAT, VERSION = "porefv.coupling", 1
+FORMAT, VERSION = "porefv.coupling", 2
 
 
 def save(coupling: Coupling, path: str | PathLike[str]) -> None:
@@ -40,73 +39,103 @@ def save(coupling: Coupling, path: str | PathLike[str]) -> None:
     """
     if not isinstance(coupling.grains, DEM):
         raise InputError("only a coupling with a porefv.dem.DEM can be saved")
-    packing = coupling.mesh.packing
-    assert packing.box is not None  # a mesh has seen to it
+    arrays, numbers = state_files.stored(coupling.state)
     header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "porefv": __version__,
         "walls": {name: asdict(wall) for name, wall in zip(WALLS, coupling.walls, strict=True)},
         "fluid": asdict(coupling.fluid),
-        "conductance": {"name": coupling.conductance.name, **vars(coupling.conductance)},
-        "options": coupling.options,
+        "conductance": _described(coupling.conductance),
+        "settings": asdict(coupling.settings),
         "effort": asdict(coupling.effort),
-        "fresh": coupling._fresh,
-        "scheme": coupling.scheme,
-        "drag_number": coupling.drag_number,
+        "numbers": numbers,
     }
     grains = grains_checkpoint.pack(coupling.grains, path)
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            header=np.array(json.dumps(header)),
-            **{f"grains_{name}": array for name, array in grains.items()},
-            mesh_centres=packing.centres,
-            mesh_radii=packing.radii,
-            mesh_box=np.stack([packing.box.lower, packing.box.upper]),
-            factor_mobilities=coupling.equation.factor_mobilities,
-            pressure=coupling._pressure,
-            rate=coupling._rate,
-            products=coupling._products,
-        )
+    content = {"header": state_files.header(FORMAT, VERSION, header), **arrays}
+    state_files.write(path, content | {f"dem_{name}": array for name, array in grains.items()})
 
 
-def load(path: str | PathLike[str]) -> Coupling:
+def load(path: str | PathLike[str], conductance: ConductanceModel | None = None) -> Coupling:
     """The coupling that was saved.
 
     Going on is exact, to the last bit, with the same porefv and numba on the same kind of processor.
 
+    Parameters
+    ----------
+    path : path
+    conductance : ConductanceModel, optional
+        The model that the run was started with. It is needed where that is not one of
+        `porefv.conductance.MODELS`; models of the package are in the file. Of another model the file has the name,
+        which is compared, but not the parameters.
+
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged, of another program, or of a newer format.
+        If the file cannot be read, is damaged, of another program, or of a newer format; if the run has a model that
+        is not one of the package and none is given, or if another is given.
     """
-    return grains_checkpoint.build(
-        grains_checkpoint.read(path), path, FORMAT, VERSION, lambda header, content: _build(header, content, path)
-    )
+    content = state_files.read(path, FORMAT)
+    header = state_files.header_of(content, path, FORMAT, VERSION)
+    with state_files.damage_refused(path, FORMAT):
+        prefix = "dem_"
+        if header["version"] == 1:
+            header, prefix = _renamed(header), "grains_"
+        grains = {name.removeprefix(prefix): array for name, array in content.items() if name.startswith(prefix)}
+        saved, described = _of_package(header["conductance"]), header["conductance"]
+        walls, fluid = Walls.from_mapping(header["walls"]), Fluid(**header["fluid"])
+        settings, effort = CouplingSettings(**header["settings"]), Effort(**header["effort"])
+        state = state_files.restored(CouplingState, content, header["numbers"])
+    model = _chosen(saved, described, conductance, path)
+    dem = grains_checkpoint.unpack(grains, path)
+    try:
+        return Coupling.from_state(state, dem, walls, fluid, model, settings, effort)
+    except InputError as error:
+        raise InputError(f"the run in {path} cannot go on: {error}") from None
 
 
-def _build(header: dict[str, Any], content: dict[str, np.ndarray], path: str | PathLike[str]) -> Coupling:
-    conductance = dict(header["conductance"])
-    grains = {name.removeprefix("grains_"): array for name, array in content.items() if name.startswith("grains_")}
-    box = Box(*content["mesh_box"])
-    coupling = Coupling(
-        grains_checkpoint.unpack(grains, path),
-        Walls.from_mapping(header["walls"]),
-        Fluid(**header["fluid"]),
-        conductance_model(conductance.pop("name"), **conductance),
-        start=Packing(content["mesh_centres"], content["mesh_radii"], box),
-        **header["options"],
-    )
-    coupling.effort = Effort(**header["effort"])
-    coupling.scheme, coupling.drag_number = header["scheme"], header["drag_number"]
-    for name, array in (("_pressure", content["pressure"]), ("_rate", content["rate"])):
-        if array.shape != coupling._pressure.shape:
-            raise ValueError(f"{name[1:]} has {array.shape} values, not {coupling._pressure.shape}")
-        setattr(coupling, name, array)
-    if content["products"].shape not in ((2, 0), (2, len(coupling._pressure))):
-        raise ValueError(f"products have shape {content['products'].shape}")
-    coupling._products = content["products"]
-    coupling._fresh = bool(header["fresh"])
-    coupling.equation.factor_mobilities = content["factor_mobilities"]
-    return coupling
+def _renamed(header: dict[str, Any]) -> dict[str, Any]:
+    """The header of a file of version 1, with the names of version 2."""
+    parameters = dict(header["conductance"])
+    conductance = {"name": parameters.pop("name")}
+    conductance |= {"parameters": parameters} if conductance["name"] in MODELS else {"class": None}
+    numbers = {name: header[name] for name in ("scheme", "drag_number", "fresh")}
+    return header | {"conductance": conductance, "settings": header["options"], "numbers": numbers}
+
+
+# ---- the conductance model --------------------------------------------------------------------------------------
+
+
+def _described(model: ConductanceModel) -> dict[str, Any]:
+    """What a file says of a model: its name, with the parameters of one of the package, or the class of another."""
+    kind = type(model)
+    if kind is MODELS.get(model.name):
+        return {"name": model.name, "parameters": vars(model)}
+    return {"name": model.name, "class": f"{kind.__module__}.{kind.__qualname__}"}
+
+
+def _of_package(described: dict[str, Any]) -> ConductanceModel | None:
+    """The model of a file, if it is one of the package."""
+    if "parameters" in described:
+        return conductance_model(described["name"], **described["parameters"])
+    return None
+
+
+def _chosen(
+    saved: ConductanceModel | None, described: dict[str, Any], given: ConductanceModel | None, path: str | PathLike[str]
+) -> ConductanceModel:
+    """The model to go on with: that of the file, or the one that is given, which must be of the same name."""
+    name = described["name"]
+    if given is None:
+        if saved is not None:
+            return saved
+        of_class = f" (class {described['class']})" if described.get("class") else ""
+        raise InputError(
+            f"the run in {path} has the conductance model {name!r}{of_class}, which is not one of porefv and not in "
+            "the file. Give the model: porefv.coupling.checkpoint.load(path, conductance=model)"
+        )
+    if ensure_model(given).name != name:
+        raise InputError(
+            f"the run in {path} has the conductance model {name!r}, not {given.name!r}. Give the model that it was "
+            "started with"
+        )
+    if saved is not None and given != saved:
+        raise InputError(f"the run in {path} has the conductance model {saved!r}, not {given!r}. Leave it out")
+    return given

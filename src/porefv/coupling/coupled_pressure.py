@@ -7,7 +7,7 @@ adds to them: dt / m for a grain. With D = 0 and velocities of half a step ago t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from porefv.flow.pressure import held_pressures
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
 from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.conjugate_gradients import preconditioned_cg
 from porefv.solvers.direct import SparseFactor
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network, reached
@@ -61,6 +62,44 @@ class Power:
         return abs(lost) / largest if largest > 0.0 else 0.0
 
 
+class Links(NamedTuple):
+    """G between the free pores, as of `porefv.solvers.network.Network`, with indices without sign.
+
+    Indices without sign need no look at whether they count from the end.
+
+    Attributes
+    ----------
+    starts : (f + 1,) uint32 array
+        Row i holds the entries starts[i] ... starts[i + 1].
+    columns : uint32 array
+        Pore at the other end of each link.
+    weights : array
+        Conductance of each link [m³/(Pa s)].
+    leaks : (f,) array
+        Conductance of each pore's links to pores of imposed pressure [m³/(Pa s)].
+    """
+
+    starts: np.ndarray
+    columns: np.ndarray
+    weights: np.ndarray
+    leaks: np.ndarray
+
+
+class Mobilities(NamedTuple):
+    """D: what a force over the step adds to velocities.
+
+    Attributes
+    ----------
+    grains : (n,) array
+        Of each grain, by row [m/(s N)].
+    walls : (6,) array
+        Of each wall along its normal [m/(s N)].
+    """
+
+    grains: np.ndarray
+    walls: np.ndarray
+
+
 class CoupledPressure:
     """The pressure equation of pores whose grains move, on one mesh.
 
@@ -94,8 +133,6 @@ class CoupledPressure:
         self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
         faces = mesh.wall_faces
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
-        # What walls yielded when the factor was made; empty before.
-        self.factor_mobilities = np.zeros(0)
         self._factor: ApproximateCholesky | SparseFactor | None = None
         self.set_pressures(pressures)
 
@@ -109,11 +146,16 @@ class CoupledPressure:
             pairs, self.conductances, self._held, self.free, np.zeros(mesh.n_pores)
         )
         self._weights = 1.0 / self.network.diagonal
-        self._starts, self._columns = self.network.starts.astype(np.uint32), self.network.columns.astype(np.uint32)
+        starts, columns = self.network.starts.astype(np.uint32), self.network.columns.astype(np.uint32)
+        self._links = Links(starts, columns, self.network.links, self.network.leaks)
         self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
         self._of_held.spread(self._held, self._held_forces)
 
     # ---- solving ------------------------------------------------------------------------------------------------
+
+    def prepare(self, wall_mobilities: np.ndarray) -> None:
+        """Make the preconditioner, for walls that yield so much (6,) [m/(s N)]; `solve` does where it is not made."""
+        self._factor = self._make_factor(wall_mobilities)
 
     def solve(
         self,
@@ -144,40 +186,23 @@ class CoupledPressure:
             If it is not reached.
         """
         if self._factor is None:
-            if len(self.factor_mobilities) == 0:
-                self.factor_mobilities = wall_mobilities.copy()
-            self._factor = self._make_factor(self.factor_mobilities)
+            self.prepare(wall_mobilities)
+        assert self._factor is not None
+        mobilities = Mobilities(self.mobilities, wall_mobilities)
         moved = velocities.copy()
-        _yield(self._held_forces, self.mobilities, wall_mobilities, moved)
+        _yield(mobilities, self._held_forces, moved)
         rhs = np.zeros(len(self.network))
         self._of_free.gather(moved, rhs)
         np.subtract(self._inflow, rhs, out=rhs)
+        operator = _StepOperator(self._of_free, self._links, mobilities, self._room_for_forces)
         x = guess.copy()
-        q, aq, z, room = self._room
-        arguments = (
-            self._of_free.rows, self._of_free.gradients, self._of_free.nodes, self._starts, self._columns,
-            self.network.links, self.network.leaks, self.mobilities, wall_mobilities, self._room_for_forces,
-        )  # fmt: skip
         if product is None:
-            _multiply(*arguments, x, aq)
-            product = aq
+            product = np.empty(len(x))
+            operator.multiply(x, product)
         r = rhs - product
-        size = _weighted_square(r, self._weights)
-        rz = self._factor.apply(r, z, room)
-        q[:] = z
-        iterations = 0
-        # The factor stands for the matrix: r·z is its estimate of the power still wrong, x·b that of the power.
-        while rz > tolerance**2 * abs(_dot(x, rhs)) and iterations < _MOST_ITERATIONS:
-            iterations += 1
-            _advance(x, r, q, aq, rz / _multiply(*arguments, q, aq))
-            before, size = size, _weighted_square(r, self._weights)
-            if rz * size / before <= tolerance**2 * abs(_dot(x, rhs)):
-                # By the diagonal so much less is left that the factor, which costs most, need not be asked.
-                return x, rhs - r, iterations
-            new = self._factor.apply(r, z, room)
-            _redirect(q, z, new / rz)
-            rz = new
-        if not rz <= max(tolerance**2 * abs(_dot(x, rhs)), 1e-300):
+        rule = _PowerRule(x, rhs, r, self._weights, tolerance)
+        iterations, found = preconditioned_cg(operator, self._factor, x, r, rule, _MOST_ITERATIONS, self._room)
+        if not found:
             raise ComputationError(
                 f"the pressures of moving pores were not found in {iterations} iterations; a larger tolerance, or a "
                 "smaller contrast of grain sizes, makes it easier"
@@ -287,35 +312,83 @@ class CoupledPressure:
         return largest
 
 
+class _StepOperator:
+    """G + E D Eᵀ of one step. `forces`, (n + 6, 3), is room to work in."""
+
+    def __init__(self, exchange: Exchange, links: Links, mobilities: Mobilities, forces: np.ndarray):
+        self._exchange, self._links, self._mobilities, self._forces = exchange, links, mobilities, forces
+
+    def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
+        """aq = (G + E D Eᵀ) q; returns q·aq."""
+        return _multiply(self._exchange, self._links, self._mobilities, self._forces, q, aq)
+
+
+class _PowerRule:
+    """Stop where the power still wrong is below the tolerance, squared, of the power x·b.
+
+    r·M⁻¹r is the preconditioner's estimate of the power still wrong. Between two estimates the rule takes it to fall
+    with Σ r² / diagonal: applying the preconditioner costs most, and may then be spared.
+    """
+
+    def __init__(self, x: np.ndarray, rhs: np.ndarray, r: np.ndarray, weights: np.ndarray, tolerance: float):
+        self._arrays, self._part = (x, rhs, r, weights), tolerance**2
+        self._power, self._size = _power_and_size(*self._arrays)
+        self._wrong = np.inf
+
+    def met_before(self, rz: float) -> bool:
+        self._wrong = rz
+        return rz <= max(self._part * self._power, 1e-300)
+
+    def met_after(self, iterations: int, lost: float) -> bool:
+        before = self._size
+        self._power, self._size = _power_and_size(*self._arrays)
+        return self._wrong * self._size / before <= self._part * self._power
+
+
 @njit(cache=True, nogil=True)
-def _yield(forces, mobilities, wall_mobilities, moves):
-    """moves += D forces; walls yield along their normals alone."""
-    n = mobilities.shape[0]
+def _yield(mobilities, forces, moves):
+    """moves += D forces, both (n + 6, 3); walls yield along their normals alone."""
+    n = mobilities.grains.shape[0]
     for k in range(n):
         for axis in range(3):
-            moves[k, axis] += mobilities[k] * forces[k, axis]
+            moves[k, axis] += mobilities.grains[k] * forces[k, axis]
     for w in range(6):
-        moves[n + w, WALL_AXES[w]] += wall_mobilities[w] * forces[n + w, WALL_AXES[w]]
+        moves[n + w, WALL_AXES[w]] += mobilities.walls[w] * forces[n + w, WALL_AXES[w]]
 
 
 @njit(cache=True, nogil=True)
-def _multiply(rows, gradients, nodes, starts, columns, links, leaks, mobilities, wall_mobilities, forces, q, aq):
-    """aq = (G + E D Eᵀ) q; returns q·aq. `forces`, (n + 6, 3), is room to work in."""
-    n = mobilities.shape[0]
+def _multiply(exchange, links, mobilities, forces, q, aq):
+    """aq = (G + E D Eᵀ) q; returns q·aq.
+
+    Parameters
+    ----------
+    exchange : Exchange
+        E, between grains and the free pores.
+    links : Links
+        G.
+    mobilities : Mobilities
+        D.
+    forces : (n + 6, 3) array
+        Room to work in.
+    q, aq : (f,) arrays
+        Pressures of the free pores [Pa], and rates [m³/s].
+    """
+    n = mobilities.grains.shape[0]
     forces[:] = 0.0
-    spread(rows, gradients, nodes, q, forces)
+    spread(exchange, q, forces)
     for k in range(n):
         for axis in range(3):
-            forces[k, axis] *= mobilities[k]
+            forces[k, axis] *= mobilities.grains[k]
     for w in range(6):
         for axis in range(3):
-            forces[n + w, axis] *= wall_mobilities[w] if axis == WALL_AXES[w] else 0.0
+            forces[n + w, axis] *= mobilities.walls[w] if axis == WALL_AXES[w] else 0.0
+    starts, columns, weights, leaks = links
     for i in range(q.shape[0]):
         total = leaks[i] * q[i]
         for k in range(starts[i], starts[i + 1]):
-            total += links[k] * (q[i] - q[columns[k]])
+            total += weights[k] * (q[i] - q[columns[k]])
         aq[i] = total
-    gather(rows, gradients, nodes, forces, aq)
+    gather(exchange, forces, aq)
     return _dot(q, aq)
 
 
@@ -327,24 +400,15 @@ def _dot(a, b):
     return total
 
 
+@njit(cache=True, nogil=True)
+def _power_and_size(x, rhs, r, weights):
+    """|x·b| and Σ w r²."""
+    return abs(_dot(x, rhs)), _weighted_square(r, weights)
+
+
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def _weighted_square(r, weights):
     total = 0.0
     for i in range(r.shape[0]):
         total += weights[i] * r[i] * r[i]
     return total
-
-
-@njit(cache=True, nogil=True)
-def _advance(x, r, q, aq, alpha):
-    """x += α q, r -= α aq."""
-    for i in range(x.shape[0]):
-        x[i] += alpha * q[i]
-        r[i] -= alpha * aq[i]
-
-
-@njit(cache=True, nogil=True)
-def _redirect(q, z, beta):
-    """q = z + β q."""
-    for i in range(q.shape[0]):
-        q[i] = z[i] + beta * q[i]

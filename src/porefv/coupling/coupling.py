@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +12,7 @@ from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
 from porefv.coupling.coupled_pressure import CoupledPressure, Power
+from porefv.coupling.coupling_state import CouplingState
 from porefv.coupling.end_correction import end_corrected_conductances
 from porefv.coupling.exchange import EXCHANGES, Exchange
 from porefv.dem.grain_model import GrainModel
@@ -27,6 +25,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
 from porefv.system.threads import threads_for
+from porefv.system.timer import Timer
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
@@ -41,6 +40,27 @@ _ANEW_EVERY = 50
 _STRIDE = 10
 # The rows of the walls in arrays of grains and walls.
 _WALL_ROWS = np.arange(-6, 0)
+
+
+@dataclass(frozen=True)
+class CouplingSettings:
+    """How a coupling steps: the parameters of `porefv.coupling.Coupling` of these names."""
+
+    scheme: str = "auto"
+    exchange: str = "facets"
+    tolerance: float = 1e-2
+    renewal: float = 0.02
+    end_correction: bool = True
+
+    def __post_init__(self) -> None:
+        if self.scheme not in SCHEMES:
+            raise InputError(f"unknown scheme {self.scheme!r}; known: {', '.join(SCHEMES)}")
+        if self.exchange not in EXCHANGES:
+            raise InputError(f"unknown exchange {self.exchange!r}; known: {', '.join(EXCHANGES)}")
+        if not 0.0 < self.tolerance < 1.0:
+            raise InputError(f"tolerance must lie between 0 and 1, not {self.tolerance!r}")
+        if not 0.0 < self.renewal <= 1.0:
+            raise InputError(f"renewal must be a part of the mean radius, in (0, 1], not {self.renewal!r}")
 
 
 @dataclass
@@ -89,19 +109,17 @@ class Coupling:
     end_correction : bool
         Whether to correct the drainage height for the looser layer of grains at a drained wall, see
         `porefv.coupling.end_correction`.
-    start : Packing, optional
-        What to make the first mesh from, if not from the grains as they are: to go on from an earlier mesh.
 
     Attributes
     ----------
+    settings : CouplingSettings
+        Scheme, exchange, tolerance, renewal and end correction.
+    state : CouplingState
+        What it holds between two steps, besides its grains.
     mesh : PoreMesh
         The current one.
-    scheme : str
-        That of the current mesh, `auto` resolved.
     equation : CoupledPressure
         The pressure equation on the current mesh.
-    drag_number : float or None
-        Of the current mesh, where the scheme asks for it; a lower bound where `auto` has seen enough.
     effort : Effort
 
     Raises
@@ -117,14 +135,8 @@ class Coupling:
     """
 
     mesh: PoreMesh
-    scheme: str
-    drag_number: float | None
     equation: CoupledPressure
-    _pressure: np.ndarray  # of the free pores
-    _rate: np.ndarray  # what the last step changed them by
-    _products: np.ndarray  # (2, n_free): products of both with the matrix; (2, 0) where that is not steady
-    _fresh: bool  # whether they are yet to be found on this mesh
-    _moves: np.ndarray
+    state: CouplingState
 
     def __init__(
         self,
@@ -138,26 +150,59 @@ class Coupling:
         tolerance: float = 1e-2,
         renewal: float = 0.02,
         end_correction: bool = True,
-        start: Packing | None = None,
     ):
-        if scheme not in SCHEMES:
-            raise InputError(f"unknown scheme {scheme!r}; known: {', '.join(SCHEMES)}")
-        if exchange not in EXCHANGES:
-            raise InputError(f"unknown exchange {exchange!r}; known: {', '.join(EXCHANGES)}")
-        if not 0.0 < tolerance < 1.0:
-            raise InputError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
-        if not 0.0 < renewal <= 1.0:
-            raise InputError(f"renewal must be a part of the mean radius, in (0, 1], not {renewal!r}")
-        self.options: dict[str, Any] = {
-            "scheme": scheme, "exchange": exchange, "tolerance": tolerance, "renewal": renewal,
-            "end_correction": end_correction,
-        }  # fmt: skip
-        self.grains = grains
-        self.walls = walls
-        self.fluid = fluid if fluid is not None else Fluid()
-        self.conductance = ensure_model(conductance) if conductance is not None else AUTO()
+        self._set_up(
+            grains, walls, fluid if fluid is not None else Fluid(),
+            ensure_model(conductance) if conductance is not None else AUTO(),
+            CouplingSettings(scheme, exchange, tolerance, renewal, end_correction),
+        )  # fmt: skip
+        self._make_mesh(Packing(grains.positions, grains.radii, grains.box))
+
+    @classmethod
+    def from_state(
+        cls,
+        state: CouplingState,
+        grains: GrainModel,
+        walls: Walls,
+        fluid: Fluid,
+        conductance: ConductanceModel,
+        settings: CouplingSettings,
+        effort: Effort,
+    ) -> Coupling:
+        """The coupling that goes on from a state, to the last bit, with the parameters that belong to it.
+
+        Parameters
+        ----------
+        state : CouplingState
+            Taken as it is, not copied.
+        grains, walls, fluid, conductance
+            As of `Coupling`, and as they were.
+        settings : CouplingSettings
+        effort : Effort
+            Of the run so far.
+
+        Raises
+        ------
+        InputError
+            If the mesh has another number of free pores than the state.
+        """
+        coupling = cls.__new__(cls)
+        coupling._set_up(grains, walls, fluid, ensure_model(conductance), settings)
+        coupling._make_mesh(state.mesh_packing)
+        free = len(coupling.state.pressure)
+        if len(state.pressure) != free:
+            raise InputError(f"the state has pressures of {len(state.pressure)} free pores, its mesh has {free}")
+        if len(state.factor_mobilities):
+            coupling.equation.prepare(state.factor_mobilities)
+        coupling.state, coupling.effort = state, effort
+        return coupling
+
+    def _set_up(
+        self, grains: GrainModel, walls: Walls, fluid: Fluid, conductance: ConductanceModel, settings: CouplingSettings
+    ) -> None:
+        self.grains, self.walls, self.fluid = grains, walls, fluid
+        self.conductance, self.settings = conductance, settings
         self.effort = Effort()
-        self._set_out(start if start is not None else Packing(grains.positions, grains.radii, grains.box))
 
     # ---- time ---------------------------------------------------------------------------------------------------
 
@@ -170,12 +215,12 @@ class Coupling:
             If the motion runs away, or pressures cannot be found.
         """
         for _ in range(steps):
-            if self.effort.steps % _STRIDE == 0 and self._moved() > self.options["renewal"]:
+            if self.effort.steps % _STRIDE == 0 and self._moved() > self.settings.renewal:
                 self.renew_mesh()
             self._step()
 
     def _step(self) -> None:
-        with self._timed("grains"):
+        with Timer(self.effort.seconds, "grains"):
             predicted, wall_speeds, _, wall_mobilities = self.grains.predict()
             self._refuse_no_way_out(wall_speeds, wall_mobilities)
             moves = self._moves
@@ -184,32 +229,41 @@ class Coupling:
             else:
                 moves[:] = self._velocities()
             moves[_WALL_ROWS, WALL_AXES] = WALL_SENSES * wall_speeds
-        with self._timed("pressure"):
-            # Half of what the last step changed: all of it would pass its noise on.
-            guess, product = self._pressure + 0.5 * self._rate, None
-            steady = self.equation.is_steady(wall_mobilities)
-            if steady and self._products.size and self.effort.steps % _ANEW_EVERY:
-                product = self._products[0] + 0.5 * self._products[1]
-            asked = self.options["tolerance"]
-            tolerance = min(asked, _ANEW) if self._fresh else asked
-            with threads_for(len(guess)):
-                pressure, product, iterations = self.equation.solve(moves, wall_mobilities, guess, tolerance, product)
-            # The change is kept only where its product with the matrix is known too, or is not needed.
-            goes_on = not self._fresh and (self._products.size > 0 or not steady)
-            self._rate = pressure - self._pressure if goes_on else np.zeros_like(pressure)
-            if steady:
-                change = product - self._products[0] if goes_on else np.zeros_like(product)
-                self._products = np.stack([product, change])
-            else:
-                self._products = np.zeros((2, 0))
-            self._pressure, self._fresh = pressure, False
-        with self._timed("forces"):
-            forces = self.equation.forces(pressure)
+        with Timer(self.effort.seconds, "pressure"):
+            iterations = self._find_pressure(moves, wall_mobilities)
+        with Timer(self.effort.seconds, "forces"):
+            forces = self.equation.forces(self.state.pressure)
             thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
-        with self._timed("grains"):
+        with Timer(self.effort.seconds, "grains"):
             self.grains.correct(forces[:-6], thrusts)
         self.effort.steps += 1
         self.effort.iterations += iterations
+
+    def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> int:
+        """Find the pressures of a step, and what the next one starts from; returns the number of iterations."""
+        state, equation, tolerance = self.state, self.equation, self.settings.tolerance
+        # Half of what the last step changed: all of it would pass its noise on.
+        guess, product = state.pressure + 0.5 * state.rate, None
+        steady = equation.is_steady(wall_mobilities)
+        if steady and state.products.size and self.effort.steps % _ANEW_EVERY:
+            product = state.products[0] + 0.5 * state.products[1]
+        if state.fresh:
+            tolerance = min(tolerance, _ANEW)
+        with threads_for(len(guess)):
+            if not len(state.factor_mobilities):
+                state.factor_mobilities = wall_mobilities.copy()
+                equation.prepare(state.factor_mobilities)
+            pressure, product, iterations = equation.solve(moves, wall_mobilities, guess, tolerance, product)
+        # The change is kept only where its product with the matrix is known too, or is not needed.
+        goes_on = not state.fresh and (state.products.size > 0 or not steady)
+        state.rate = pressure - state.pressure if goes_on else np.zeros_like(pressure)
+        before, state.products = state.products, np.zeros((2, len(product) if steady else 0))
+        if steady:
+            state.products[0] = product
+            if goes_on:
+                np.subtract(product, before[0], out=state.products[1])
+        state.pressure, state.fresh = pressure, False
+        return iterations
 
     def _refuse_no_way_out(self, wall_speeds: np.ndarray, wall_mobilities: np.ndarray) -> None:
         """An incompressible fluid needs an open wall, or one that yields, where others move."""
@@ -243,72 +297,82 @@ class Coupling:
     def renew_mesh(self) -> None:
         """Make the mesh anew, with the pressures there were."""
         around = _mean_by_vertex(self.mesh, self.cell_pressure)
-        self._set_out(Packing(self.grains.positions, self.grains.radii, self.grains.box))
+        self._make_mesh(Packing(self.grains.positions, self.grains.radii, self.grains.box))
         cells = around[self.mesh.cells].mean(axis=1)
         pores = np.bincount(self.mesh.cell_pore, cells, self.mesh.n_pores) / np.bincount(self.mesh.cell_pore)
-        self._pressure = pores[self.equation.free]
+        self.state.pressure = pores[self.equation.free]
 
-    def _set_out(self, packing: Packing) -> None:
-        """Make the mesh of a packing, its conductances and its exchange with the grains, without pressures."""
-        with self._timed("mesh"):
+    def _make_mesh(self, packing: Packing) -> None:
+        """Make the mesh of a packing, its conductances and its exchange with the grains; pressures are zero."""
+        with Timer(self.effort.seconds, "mesh"):
             grains, slip, pressures = self.grains, self.walls.slip, self.walls.pressures
             mesh = PoreMesh(packing)
             conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
-            if self.options["end_correction"]:
+            if self.settings.end_correction:
                 conductances = end_corrected_conductances(mesh, conductances, pressures)
             held = ~np.isnan(held_pressures(mesh, pressures))
             weights = solid_pressure_weights(mesh, self.conductance, conductances, slip, held)
             exchange = Exchange.of(
-                mesh, self.options["exchange"], slip, grains.rows,
+                mesh, self.settings.exchange, slip, grains.rows,
                 split=self.conductance.force_split, solid_pressure=weights,
             )  # fmt: skip
             drag = np.empty(len(packing))
             drag[grains.rows] = grains.step / grains.masses
-            self._choose(lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities), drag)
+            self.equation, scheme, drag_number = self._choose(
+                lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities), drag
+            )
             self.mesh = mesh
+            self.state = CouplingState.of(packing, int(np.count_nonzero(self.equation.free)), scheme, drag_number)
             self._mean_radius = float(packing.radii.mean())
             self._closed = bool(np.isnan(pressures).all())
-            self._pressure, self._rate = np.zeros((2, np.count_nonzero(self.equation.free)))
-            self._products = np.zeros((2, 0))
-            self._fresh = True
             self._moves = np.zeros((len(packing) + 6, 3))
         self.effort.meshes += 1
 
-    def _choose(self, pores: Callable[[np.ndarray], CoupledPressure], drag: np.ndarray) -> None:
-        """The scheme, by the drag number where that is asked for; refuse an unstable one."""
-        asked = self.options["scheme"]
-        self.drag_number = None
-        self.scheme = asked
-        if asked != "implicit-drag":
-            explicit = pores(np.zeros_like(drag))
-            if explicit.cut_off:
-                if asked == "semi-implicit":
-                    raise InputError(
-                        f"no throat leads out of {explicit.cut_off} pores, whose volume changes as grains move: their "
-                        "pressure is not defined in a semi-implicit step. Use scheme = 'implicit-drag'"
-                    )
-                self.scheme = "implicit-drag"
-            else:
-                self.drag_number = explicit.drag_number(drag, EXPLICIT if asked == "auto" else np.inf)
-                if asked == "auto":
-                    self.scheme = "semi-implicit" if self.drag_number <= EXPLICIT else "implicit-drag"
-                elif self.drag_number > UNSTABLE:
-                    raise InputError(
-                        f"a semi-implicit step of {self.grains.step:.3g} s is unstable: its drag number is "
-                        f"{self.drag_number:.3g}, {UNSTABLE} at most. Use scheme = 'implicit-drag', or a step below "
-                        f"{self.grains.step * UNSTABLE / self.drag_number:.2g} s"
-                    )
-            if self.scheme == "semi-implicit":
-                self.equation = explicit
-                return
-        self.equation = pores(drag)
+    def _choose(
+        self, equation: Callable[[np.ndarray], CoupledPressure], drag: np.ndarray
+    ) -> tuple[CoupledPressure, str, float | None]:
+        """The equation, the scheme and the drag number, where that decides; refuse an unstable scheme.
+
+        `equation` is called with the mobilities of the grains: `drag` (n,), or none for a step explicit in the drag.
+        """
+        asked = self.settings.scheme
+        if asked == "implicit-drag":
+            return equation(drag), asked, None
+        explicit = equation(np.zeros_like(drag))
+        if explicit.cut_off:
+            if asked == "semi-implicit":
+                raise InputError(
+                    f"no throat leads out of {explicit.cut_off} pores, whose volume changes as grains move: their "
+                    "pressure is not defined in a semi-implicit step. Use scheme = 'implicit-drag'"
+                )
+            return equation(drag), "implicit-drag", None
+        drag_number = explicit.drag_number(drag, EXPLICIT if asked == "auto" else np.inf)
+        if asked == "auto" and not drag_number <= EXPLICIT:
+            return equation(drag), "implicit-drag", drag_number
+        if drag_number > UNSTABLE:
+            raise InputError(
+                f"a semi-implicit step of {self.grains.step:.3g} s is unstable: its drag number is "
+                f"{drag_number:.3g}, {UNSTABLE} at most. Use scheme = 'implicit-drag', or a step below "
+                f"{self.grains.step * UNSTABLE / drag_number:.2g} s"
+            )
+        return explicit, "semi-implicit", drag_number
 
     # ---- what there is ------------------------------------------------------------------------------------------
 
     @property
+    def scheme(self) -> str:
+        """That of the current mesh, `auto` resolved."""
+        return self.state.scheme
+
+    @property
+    def drag_number(self) -> float | None:
+        """Of the current mesh, where the scheme needs it; a lower bound where that was enough for `auto`."""
+        return self.state.drag_number
+
+    @property
     def pressure(self) -> np.ndarray:
         """(n_pores,): piezometric pressure of each pore of `mesh` over the last step [Pa]."""
-        return self.equation.full(self._pressure)
+        return self.equation.full(self.state.pressure)
 
     @property
     def cell_pressure(self) -> np.ndarray:
@@ -318,12 +382,12 @@ class Coupling:
     @property
     def fluid_forces(self) -> np.ndarray:
         """(n, 3): force of the fluid on each grain over the last step, by id [N]."""
-        return self.equation.forces(self._pressure)[:-6][self.grains.rows]
+        return self.equation.forces(self.state.pressure)[:-6][self.grains.rows]
 
     @property
     def wall_fluid_forces(self) -> np.ndarray:
         """(6, 3): force of the fluid on each wall over the last step [N]."""
-        return self.equation.forces(self._pressure)[-6:]
+        return self.equation.forces(self.state.pressure)[-6:]
 
     def _velocities(self) -> np.ndarray:
         velocities = np.empty_like(self._moves)
@@ -334,19 +398,13 @@ class Coupling:
     @property
     def wall_flux(self) -> dict[str, float]:
         """Flux into the sample through each wall over the last step [m³/s]."""
-        fluxes = self.equation.wall_fluxes(self._pressure, self._velocities())
+        fluxes = self.equation.wall_fluxes(self.state.pressure, self._velocities())
         return {name: float(q) for name, q in zip(WALLS, fluxes, strict=True)}
 
     @property
     def power(self) -> Power:
         """Where the fluid's power went over the last step."""
-        return self.equation.power(self._pressure, self._velocities())
-
-    @contextmanager
-    def _timed(self, part: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        yield
-        self.effort.seconds[part] += time.perf_counter() - begin
+        return self.equation.power(self.state.pressure, self._velocities())
 
     def __repr__(self) -> str:
         return f"Coupling({self.grains!r}, {self.scheme}, {self.mesh.n_pores} pores)"

@@ -14,7 +14,7 @@ Summed over all pores both are the rate of the box.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,9 +28,10 @@ from porefv.system.kernels import njit
 EXCHANGES = ("facets", "volumes")
 
 
-@dataclass(frozen=True, eq=False)
-class Exchange:
+class Exchange(NamedTuple):
     """The operator E, cell by cell, and once more for each neighbour whose pressure acts on the cell's solid.
+
+    A named tuple, so that compiled kernels take it as it is.
 
     Attributes
     ----------
@@ -119,11 +120,11 @@ class Exchange:
 
     def gather(self, moves: np.ndarray, out: np.ndarray) -> None:
         """Add E ẋ to `out`, by entry, from the velocities (n + 6, 3) of grains, by row, and walls."""
-        gather(self.rows, self.gradients, self.nodes, moves, out)
+        gather(self, moves, out)
 
     def spread(self, pressure: np.ndarray, out: np.ndarray) -> None:
         """Add Eᵀ p to `out` (n + 6, 3), from pressures by entry."""
-        spread(self.rows, self.gradients, self.nodes, pressure, out)
+        spread(self, pressure, out)
 
 
 def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> np.ndarray:
@@ -150,8 +151,18 @@ def _gather_facets(cells, facet_cells, facet_vertices, forces, gradients):
 
 
 @njit(cache=True, nogil=True)
-def gather(rows, gradients, nodes, moves, out):
-    """out[node] += Σ gradient · move over each cell's vertices."""
+def gather(exchange, moves, out):
+    """out[node] += Σ gradient · move over each cell's vertices.
+
+    Parameters
+    ----------
+    exchange : Exchange
+    moves : (n + 6, 3) array
+        Velocities of grains, by row, and walls [m/s], or displacements.
+    out : array by entry
+        Added to [m³/s].
+    """
+    rows, gradients, nodes = exchange
     for t in range(rows.shape[0]):
         total = 0.0
         for i in range(4):
@@ -162,8 +173,18 @@ def gather(rows, gradients, nodes, moves, out):
 
 
 @njit(cache=True, nogil=True)
-def spread(rows, gradients, nodes, pressure, out):
-    """out[vertex] += gradient × pressure[node], over the vertices of each cell."""
+def spread(exchange, pressure, out):
+    """out[vertex] += gradient × pressure[node], over the vertices of each cell.
+
+    Parameters
+    ----------
+    exchange : Exchange
+    pressure : array by entry
+        [Pa]
+    out : (n + 6, 3) array
+        Forces on grains, by row, and walls, added to [N].
+    """
+    rows, gradients, nodes = exchange
     for t in range(rows.shape[0]):
         p = pressure[nodes[t]]
         for i in range(4):

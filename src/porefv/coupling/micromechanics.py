@@ -5,7 +5,7 @@ Both are positive in compression: a sample that is pressed, and shortens, has po
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,13 @@ from porefv.system.kernels import njit, prange
 if TYPE_CHECKING:
     from porefv.dem.measurements import Contacts
     from porefv.mesh.pore_mesh import PoreMesh
+
+
+class Displacements(NamedTuple):
+    """Displacements of grains (n, 3), and of walls (6,) along their outward normals [m]."""
+
+    grains: np.ndarray
+    walls: np.ndarray
 
 
 def grain_stresses(contacts: Contacts, centres: np.ndarray, volumes: np.ndarray) -> np.ndarray:
@@ -165,11 +172,11 @@ def _integrals(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: Arr
     ):
         if moves.shape != shape or not np.isfinite(moves).all():
             raise InputError(f"{what}, must be finite numbers of shape {shape}, not {moves.shape}")
-    return _displacement_integrals(mesh.cells, mesh.n_spheres, mesh.local_points, mesh.sizes, u, walls)
+    return _displacement_integrals(mesh.cells, mesh.n_spheres, mesh.local_points, mesh.sizes, Displacements(u, walls))
 
 
 @njit(cache=True, parallel=True)
-def _displacement_integrals(cells, n, points, sizes, moves, wall_moves):
+def _displacement_integrals(cells, n, points, sizes, displacements):
     """∮ u ⊗ n dS over each cell: facet by facet, the mean displacement times the area vector.
 
     The facet opposite to a wall has a projection on it, the cell's face there: the same displacement but for the
@@ -184,22 +191,23 @@ def _displacement_integrals(cells, n, points, sizes, moves, wall_moves):
             # A step in the cycle of four is an odd permutation: every other facet is turned for its area to point out.
             a, b, c = spheres_first(a, c, b, n) if i % 2 == 0 else spheres_first(a, b, c, n)
             area = area_vector(a, b, c, n, points, sizes)
-            mean = _mean_displacement(a, b, c, n, points, sizes, moves, wall_moves)
+            mean = _mean_displacement(a, b, c, n, points, sizes, displacements)
             for p in range(3):
                 for q in range(3):
                     integrals[t, p, q] += mean[p] * area[q]
             wall = cells[t, i] - n
             if wall >= 0:
                 axis = WALL_AXES[wall]
-                mean[axis] = points[n + wall, axis] * wall_moves[wall]
+                mean[axis] = points[n + wall, axis] * displacements.walls[wall]
                 for p in range(3):
                     integrals[t, p, axis] -= mean[p] * area[axis]
     return integrals
 
 
 @njit(cache=True)
-def _mean_displacement(a, b, c, n, points, sizes, moves, wall_moves):
+def _mean_displacement(a, b, c, n, points, sizes, displacements):
     """Mean displacement over a facet: linear on a triangle, bilinear between the corners of the others."""
+    moves, wall_moves = displacements
     mean = np.empty(3)
     for axis in range(3):
         mean[axis] = moves[a, axis]

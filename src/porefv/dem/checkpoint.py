@@ -1,77 +1,84 @@
 """State of a DEM on disk: a run that is loaded goes on to the last bit as if it had never been stopped.
 
-A checkpoint is one .npz file: `header`, JSON text with the format, its version and all single values, and an array for
-each of `_ARRAYS`, in the inside numbering that `order` turns into ids. Nothing in it is pickled.
+A checkpoint is one .npz file (`porefv.dem.state_files`): the entries of the `GrainState` and of the `Settings`, and in
+the header the material and the plates. Nothing in it is pickled.
 """
 
 from __future__ import annotations
 
-import json
-import zipfile
-from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from os import PathLike
-from typing import Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 
+from porefv.dem import state_files
 from porefv.dem.dem import DEM
+from porefv.dem.grain_state import GrainState
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
+from porefv.dem.state_files import ArrayOf, Arrays
 from porefv.errors import ComputationError, InputError
-from porefv.system.atomic_files import atomic_write
-from porefv.system.version import __version__
 
-FORMAT, VERSION = "porefv.dem", 2
-State = TypeVar("State")
+FORMAT, VERSION = "porefv.dem", 3
 
-# What a DEM holds between two runs, by attribute. Shapes: n grains, p pairs of grains, k pairs of a grain and a wall,
-# s threads.
-_NUMBERS = {
-    "damping": float, "step": float, "time": float, "_slack": float, "_applied_work": float,
-    "steps": int, "threads": int,
-}  # fmt: skip
-_ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
-    "gravity": ("f8", (3,)),
-    "places": ("f8", (6,)),
-    "wall_velocities": ("f8", (6, 3)),
-    "_order": ("i8", ("n",)),
-    "_rank": ("i8", ("n",)),
-    "_state": ("f8", ("n", 10)),
-    "_applied": ("f8", ("n", 3)),
-    "_inverse_mass": ("f8", ("n",)),
-    "_inverse_inertia": ("f8", ("n",)),
-    "_wall_forces": ("f8", (6, 3)),
-    "_wall_yields": ("f8", (6,)),
-    "_targets": ("f8", (6,)),
-    "_top_speeds": ("f8", (6,)),
-    "_wall_friction": ("f8", (6,)),
-    "_pairs": ("i4", ("p", 2)),
-    "_starts": ("i8", ("n + 1",)),
-    "_others": ("i4", ("p",)),
-    "_grain_ranges": ("i8", ("s + 1",)),
-    "_stiffness": ("f8", ("p",)),
-    "_shear": ("f8", ("p", 3)),
-    "_touching": ("?", ("p",)),
-    "_wall_pairs": ("i4", ("k", 2)),
-    "_wall_pair_ranges": ("i8", ("s + 1",)),
-    "_wall_pair_stiffness": ("f8", ("k",)),
-    "_wall_pair_shear": ("f8", ("k", 3)),
-    "_wall_pair_touching": ("?", ("k",)),
-    "_start": ("f8", ("n", 3)),
-    "_wall_start": ("f8", (6,)),
-    "_work": ("f8", (3,)),
+# What entries are called in files of version 2 ...
+_NAMES_OF_VERSION_2 = {
+    "grains_motion": "state",
+    "grains_inverse_mass": "inverse_mass",
+    "grains_inverse_inertia": "inverse_inertia",
+    "pairs_grains": "pairs",
+    "pairs_starts": "starts",
+    "pairs_others": "others",
+    "pairs_stiffness": "stiffness",
+    "pairs_shear": "shear",
+    "pairs_touching": "touching",
+    "pairs_ranges": "grain_ranges",
+    "wall_pairs_members": "wall_pairs",
+    "wall_pairs_stiffness": "wall_pair_stiffness",
+    "wall_pairs_shear": "wall_pair_shear",
+    "wall_pairs_touching": "wall_pair_touching",
+    "wall_pairs_ranges": "wall_pair_ranges",
+    "walls_places": "places",
+    "walls_velocities": "wall_velocities",
+    "walls_targets": "targets",
+    "walls_top_speeds": "top_speeds",
+    "walls_friction": "wall_friction",
+    "walls_forces": "wall_forces",
+    "walls_yields": "wall_yields",
+    "listing_centres": "start",
+    "listing_walls": "wall_start",
+    "listing_slack": "slack",
 }
-# Arrays that version 1 of the format calls by another name.
+# ... and, where they differ from those, in files of version 1.
 _NAMES_OF_VERSION_1 = {
-    "grain_ranges": "shares", "wall_pairs": "rims", "wall_pair_ranges": "rim_shares",
-    "wall_pair_stiffness": "rim_stiffness", "wall_pair_shear": "rim_shear", "wall_pair_touching": "rim_touching",
-}  # fmt: skip
-# Zero between two steps, and made anew.
-_LOADS = ("_loads", "_wall_loads", "_halfway")
+    "pairs_ranges": "shares",
+    "wall_pairs_members": "rims",
+    "wall_pairs_stiffness": "rim_stiffness",
+    "wall_pairs_shear": "rim_shear",
+    "wall_pairs_touching": "rim_touching",
+    "wall_pairs_ranges": "rim_shares",
+}
 
-# Every attribute of a DEM; tests compare it with what there is.
-ATTRIBUTES = frozenset(("material", "plates", *_NUMBERS, *_ARRAYS, *_LOADS))
+
+@dataclass
+class Settings:
+    """Parameters of a DEM besides its material and plates.
+
+    Attributes
+    ----------
+    gravity : (3,) array
+        [m/s²]
+    damping : float
+    step : float
+        [s]
+    threads : int
+    """
+
+    gravity: Annotated[np.ndarray, ArrayOf("f8", (3,))]
+    damping: float
+    step: float
+    threads: int
 
 
 def save(dem: DEM, path: str | PathLike[str]) -> None:
@@ -90,27 +97,24 @@ def save(dem: DEM, path: str | PathLike[str]) -> None:
     InputError
         If the file cannot be written.
     """
-    content = pack(dem, path)
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, **content)
+    state_files.write(path, pack(dem, path))
 
 
-def pack(dem: DEM, path: str | PathLike[str]) -> dict[str, Any]:
-    """The arrays of a checkpoint, for `path`; errors as `save`."""
-    if dem._halfway:
+def pack(dem: DEM, path: str | PathLike[str]) -> Arrays:
+    """The content of a checkpoint, for `path`; errors as `save`."""
+    if dem.halfway:
         raise InputError("a step is half taken: finish it with `correct` before its state is saved")
     _refuse_runaway(dem, path)
+    settings = Settings(dem.gravity, float(dem.damping), float(dem.step), dem.threads)
+    entries = [state_files.stored(part) for part in (settings, dem.state)]
     header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "porefv": __version__,
         "material": asdict(dem.material),
         "plates": {
             name: asdict(plate) | {"velocity": [float(v) for v in plate.velocity]} for name, plate in dem.plates.items()
         },
-        "numbers": {_key(name): kind(getattr(dem, name)) for name, kind in _NUMBERS.items()},
+        "numbers": entries[0][1] | entries[1][1],
     }
-    return {"header": np.array(json.dumps(header)), **{_key(name): getattr(dem, name) for name in _ARRAYS}}
+    return {"header": state_files.header(FORMAT, VERSION, header), **entries[0][0], **entries[1][0]}
 
 
 def load(path: str | PathLike[str]) -> DEM:
@@ -123,36 +127,33 @@ def load(path: str | PathLike[str]) -> DEM:
     InputError
         If the file cannot be read, is damaged, of another program, or of a newer format.
     """
-    return unpack(read(path), path)
+    return unpack(state_files.read(path, FORMAT), path)
 
 
-def unpack(content: dict[str, np.ndarray], path: str | PathLike[str]) -> DEM:
-    """The DEM whose arrays `pack` gave, read from `path`; errors as `load`."""
-    return build(content, path, FORMAT, VERSION, _build)
+def unpack(content: Arrays, path: str | PathLike[str]) -> DEM:
+    """The DEM whose content `pack` gave, read from `path`; errors as `load`."""
+    header = state_files.header_of(content, path, FORMAT, VERSION)
+    with state_files.damage_refused(path, FORMAT):
+        if header["version"] < VERSION:
+            header, content = _renamed(header, content)
+        numbers = header["numbers"]
+        settings = state_files.restored(Settings, content, numbers)
+        state = state_files.restored(GrainState, content, numbers, {"s": settings.threads})
+        material = Material(**header["material"])
+        plates = {
+            name: Plate(**(plate | {"velocity": tuple(plate["velocity"])})) for name, plate in header["plates"].items()
+        }
+        return DEM.from_state(state, material, plates, **vars(settings))
 
 
-def build(
-    content: dict[str, np.ndarray],
-    path: str | PathLike[str],
-    name: str,
-    newest: int,
-    make: Callable[[dict[str, Any], dict[str, np.ndarray]], State],
-) -> State:
-    """What `make` makes of the header and the arrays of a checkpoint of that format, up to its newest version."""
-    try:
-        header = json.loads(str(content["header"]))
-        if header["format"] != name:
-            raise ValueError(f"its format is {header['format']!r}")
-        version = int(header["version"])
-        if version <= newest:
-            return make(header, content)
-    except (KeyError, TypeError, ValueError) as error:
-        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise _unreadable(path, reason, name) from None
-    raise InputError(
-        f"{path} has format {version}, written by porefv {header.get('porefv', '(unknown)')}; this one, porefv "
-        f"{__version__}, reads formats to {newest}. Install the newer porefv to load it"
+def _renamed(header: dict[str, Any], content: Arrays) -> tuple[dict[str, Any], Arrays]:
+    """Header and content of a file of version 1 or 2, with the names of version 3."""
+    old = _NAMES_OF_VERSION_2 | (_NAMES_OF_VERSION_1 if header["version"] == 1 else {})
+    numbers, arrays = (
+        entries | {new: entries[name] for new, name in old.items() if name in entries}
+        for entries in (header["numbers"], content)
     )
+    return header | {"numbers": numbers}, arrays
 
 
 def run_saving(dem: DEM, steps: int, path: str | PathLike[str], every: int) -> None:
@@ -193,77 +194,13 @@ def run_saving(dem: DEM, steps: int, path: str | PathLike[str], every: int) -> N
         raise KeyboardInterrupt(f"interrupted. Last good state, step {load(path).steps}, in {path}") from None
 
 
-def _key(attribute: str) -> str:
-    """Name in the file."""
-    return attribute.lstrip("_")
-
-
 def _refuse_runaway(dem: DEM, path: str | PathLike[str]) -> None:
-    state = dem._state
-    speeds = np.sqrt((state[:, 4:7] ** 2).sum(axis=1))
-    good = np.isfinite(state).all(axis=1) & (speeds <= dem.fastest)
+    motion = dem.state.grains.motion
+    speeds = np.sqrt((motion[:, 4:7] ** 2).sum(axis=1))
+    good = np.isfinite(motion).all(axis=1) & (speeds <= dem.fastest)
     if not good.all():
         worst = int(np.argmin(good))
         raise ComputationError(
-            f"the motion runs away at step {dem.steps}: grain {dem._order[worst]} moves at {speeds[worst]:.3g} m/s. "
-            f"Such a state is not saved; {path} is as it was"
+            f"the motion runs away at step {dem.steps}: grain {dem.state.order[worst]} moves at {speeds[worst]:.3g} "
+            f"m/s. Such a state is not saved; {path} is as it was"
         )
-
-
-def read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
-    """Everything in the file, whose checksums hold."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            damaged = archive.testzip()
-        if damaged is not None:
-            raise zipfile.BadZipFile(f"{damaged} is damaged")
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except OSError as error:
-        raise InputError(
-            f"cannot read {path}: {error.strerror or error}. Give a checkpoint that porefv.dem saved"
-        ) from None
-    except MemoryError:
-        raise
-    except Exception as error:  # damage may surface anywhere in zipfile, zlib or numpy
-        raise _unreadable(path, str(error) or type(error).__name__) from None
-
-
-def _unreadable(path: str | PathLike[str], reason: str, name: str = FORMAT) -> InputError:
-    return InputError(
-        f"{path} is not a checkpoint of {name}, or it is damaged ({reason}). Give another checkpoint, or start the "
-        "run anew"
-    )
-
-
-def _build(header: dict[str, Any], content: dict[str, np.ndarray]) -> DEM:
-    """The DEM, past its constructor, which would list pairs anew and forget what contacts hold.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        If something is missing, or is not what it should be.
-    """
-    if header["version"] == 1:
-        content = content | {name: content[old] for name, old in _NAMES_OF_VERSION_1.items()}
-    dem = DEM.__new__(DEM)
-    dem.material = Material(**header["material"])
-    dem.plates = {
-        name: Plate(**(plate | {"velocity": tuple(plate["velocity"])})) for name, plate in header["plates"].items()
-    }
-    for name, kind in _NUMBERS.items():
-        setattr(dem, name, kind(header["numbers"][_key(name)]))
-    n = len(content["state"])
-    sizes: dict[str | int, int] = {
-        "n": n, "n + 1": n + 1, "s + 1": dem.threads + 1, "p": len(content["pairs"]), "k": len(content["wall_pairs"])
-    }  # fmt: skip
-    for name, (dtype, shape) in _ARRAYS.items():
-        array = content[_key(name)]
-        expected = tuple(sizes.get(size, size) for size in shape)
-        if array.dtype != np.dtype(dtype) or array.shape != expected:
-            raise ValueError(f"{_key(name)} is {array.dtype} {array.shape}, not {np.dtype(dtype)} {expected}")
-        setattr(dem, name, array)
-    dem._loads = np.zeros((dem.threads, n, 6))
-    dem._wall_loads = np.zeros((dem.threads, 6, 4))
-    dem._halfway = False
-    return dem

@@ -4,17 +4,14 @@ Normal force k_n u_n where two spheres overlap by u_n, none where they do not; t
 k_s times the slip, at most tan φ times the normal force. The tangential force is kept per pair while the pair
 touches, turned with the contact, and forgotten when it opens. A wall stands for the mirror image of the grain it meets.
 
-Arrays of the kernels
-    state (n, 10)       x y z r, vx vy vz, wx wy wz: centre, radius, velocity, spin of each grain
-    loads (n, 6)        force and torque on each grain, added to
-    stiffness (m,)      k_n of each pair of grains i < j that may touch
-    shear (m, 3)        tangential force on i, zero unless touching
-    touching (m,)       whether the pair touches
-
-Frictional contacts are worked out a block at a time, from columns of numbers that the processor takes four by four.
+The kernels take the groups of arrays of `porefv.dem.grain_state`, and change what pairs hold: whether they touch, and
+their tangential force. Frictional contacts are worked out a block at a time, from columns of numbers that the processor
+takes four by four.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,13 +42,59 @@ _FAST = {"contract", "nsz", "arcp", "nnan", "ninf"}
 _TINY = 1e-300
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def grain_contacts(first, last, state, starts, others, stiffness, ratio, friction, dt, shear, touching, loads):
-    """Forces of the pairs of grains first ... last - 1 with later ones; returns the energy that sliding dissipates.
+class StepParameters(NamedTuple):
+    """What a step depends on besides the state of grains and walls.
 
-    Pairs of grain i are starts[i] ... starts[i + 1], with the grains `others`. `ratio` is k_s / k_n, `friction` tan φ;
-    where either is zero nothing tangential is computed.
+    Attributes
+    ----------
+    dt : float
+        [s]
+    ratio : float
+        k_s / k_n; without it nothing tangential is computed.
+    friction : float
+        tan φ between grains; likewise.
+    gravity : (3,) array
+        [m/s²]
+    damping : float
+        Part of each acceleration that is taken off where it speeds a component of the motion up, and added where it
+        slows it.
+    gain : float
+        Part of the way to balance, by the stiffness of its contacts, that a pressing wall moves in a step.
+    fastest : float
+        Speed at which the motion counts as runaway [m/s].
     """
+
+    dt: float
+    ratio: float
+    friction: float
+    gravity: np.ndarray
+    damping: float
+    gain: float
+    fastest: float
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def grain_contacts(first, last, parameters, grains, pairs, loads):
+    """Forces of the pairs of grains first ... last - 1 with later ones.
+
+    Parameters
+    ----------
+    first, last : int
+    parameters : StepParameters
+    grains : Grains
+    pairs : GrainPairs
+        Shear and touching are changed.
+    loads : (n, 6) array
+        Force [N] and torque [N m] on each grain, added to.
+
+    Returns
+    -------
+    float
+        Energy that sliding dissipates [J].
+    """
+    ratio, friction, dt = parameters.ratio, parameters.friction, parameters.dt
+    motion, starts, others = grains.motion, pairs.starts, pairs.others
+    stiffness, shear, touching = pairs.stiffness, pairs.shear, pairs.touching
     frictional = ratio > 0.0 and friction > 0.0
     block = np.empty(_COLUMNS)
     for k in range(_SIZE):
@@ -61,15 +104,15 @@ def grain_contacts(first, last, state, starts, others, stiffness, ratio, frictio
     dissipated = 0.0
     m = 0
     for i in range(first, last):
-        x, y, z, r = state[i, 0], state[i, 1], state[i, 2], state[i, 3]
-        vx, vy, vz = state[i, 4], state[i, 5], state[i, 6]
-        wx, wy, wz = state[i, 7], state[i, 8], state[i, 9]
+        x, y, z, r = motion[i, 0], motion[i, 1], motion[i, 2], motion[i, 3]
+        vx, vy, vz = motion[i, 4], motion[i, 5], motion[i, 6]
+        wx, wy, wz = motion[i, 7], motion[i, 8], motion[i, 9]
         for c in range(starts[i], starts[i + 1]):
             j = others[c]
-            dx = state[j, 0] - x
-            dy = state[j, 1] - y
-            dz = state[j, 2] - z
-            reach = r + state[j, 3]
+            dx = motion[j, 0] - x
+            dy = motion[j, 1] - y
+            dz = motion[j, 2] - z
+            reach = r + motion[j, 3]
             square = dx * dx + dy * dy + dz * dz
             if square >= reach * reach:
                 if touching[c]:
@@ -94,36 +137,36 @@ def grain_contacts(first, last, state, starts, others, stiffness, ratio, frictio
             block[_BRANCH + 2 * _SIZE + m] = dz
             block[_RADIUS + m] = r
             block[_REACH + m] = reach
-            block[_MOTION + m] = state[j, 4] - vx
-            block[_MOTION + _SIZE + m] = state[j, 5] - vy
-            block[_MOTION + 2 * _SIZE + m] = state[j, 6] - vz
+            block[_MOTION + m] = motion[j, 4] - vx
+            block[_MOTION + _SIZE + m] = motion[j, 5] - vy
+            block[_MOTION + 2 * _SIZE + m] = motion[j, 6] - vz
             block[_SPIN_I + m] = wx
             block[_SPIN_I + _SIZE + m] = wy
             block[_SPIN_I + 2 * _SIZE + m] = wz
             for a in range(3):
-                block[_SPIN_J + a * _SIZE + m] = state[j, 7 + a]
+                block[_SPIN_J + a * _SIZE + m] = motion[j, 7 + a]
                 block[_SHEAR + a * _SIZE + m] = shear[c, a]
             block[_NORMAL_STIFFNESS + m] = stiffness[c]
             block[_SHEAR_STIFFNESS + m] = ratio * stiffness[c]
             m += 1
             if m == _SIZE:
                 _contact_law(m, dt, block)
-                dissipated += _hand_out(m, block, pair, grain, others, shear, loads)
+                dissipated += _hand_out(m, block, pair, grain, pairs, loads)
                 m = 0
     _contact_law(m, dt, block)
-    return dissipated + _hand_out(m, block, pair, grain, others, shear, loads)
+    return dissipated + _hand_out(m, block, pair, grain, pairs, loads)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _hand_out(m, block, pair, grain, others, shear, loads):
-    """Add what a block has found to the loads of its grains."""
+def _hand_out(m, block, pair, grain, pairs, loads):
+    """Add what a block has found to the loads of its grains; returns the energy dissipated."""
     dissipated = 0.0
     for k in range(m):
         c = pair[k]
         i = grain[k]
-        j = others[c]
+        j = pairs.others[c]
         for a in range(3):
-            shear[c, a] = block[_SHEAR + a * _SIZE + k]
+            pairs.shear[c, a] = block[_SHEAR + a * _SIZE + k]
             loads[i, a] += block[_FORCE + a * _SIZE + k]
             loads[j, a] -= block[_FORCE + a * _SIZE + k]
             loads[i, 3 + a] += block[_TORQUE_I + a * _SIZE + k]
@@ -133,27 +176,43 @@ def _hand_out(m, block, pair, grain, others, shear, loads):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def wall_contacts(
-    first, last, state, wall_pairs, stiffness, ratio, friction, dt, places, velocities, shear, touching, loads,
-    wall_loads,
-):  # fmt: skip
-    """Forces between grains and walls; returns the energy that sliding dissipates.
+def wall_contacts(first, last, parameters, grains, pairs, walls, loads, wall_loads):
+    """Forces of the pairs first ... last - 1 of a grain and a wall.
 
-    `wall_pairs` (m, 2) are the pairs of a grain and a wall that may touch. Wall w is at places[w] along its axis, and
-    moves with velocities[w]; wall_loads (6, 4), added to, holds the force on it and the sum of the stiffnesses of its
-    contacts. `friction` (6,) is tan φ. A grain whose centre is beyond a wall gets an infinite load, which stops the
-    motion.
+    Parameters
+    ----------
+    first, last : int
+    parameters : StepParameters
+        The friction is that of each wall instead.
+    grains : Grains
+    pairs : WallPairs
+        Shear and touching are changed.
+    walls : MovingWalls
+    loads : (n, 6) array
+        Force [N] and torque [N m] on each grain, added to. A grain whose centre is beyond a wall gets an infinite
+        one, which stops the motion.
+    wall_loads : (6, 4) array
+        Force on each wall [N], and the sum of the stiffnesses of its contacts [N/m], added to.
+
+    Returns
+    -------
+    float
+        Energy that sliding dissipates [J].
     """
+    ratio, dt = parameters.ratio, parameters.dt
+    motion, members, stiffness, shear, touching, friction = (
+        grains.motion, pairs.members, pairs.stiffness, pairs.shear, pairs.touching, walls.friction
+    )  # fmt: skip
     block = np.empty(_COLUMNS)
     pair = np.empty(_SIZE, np.int64)
     dissipated = 0.0
     m = 0
     for c in range(first, last):
-        i = wall_pairs[c, 0]
-        w = wall_pairs[c, 1]
+        i = members[c, 0]
+        w = members[c, 1]
         axis = WALL_AXES[w]
-        r = state[i, 3]
-        ahead = places[w] - state[i, axis]
+        r = motion[i, 3]
+        ahead = walls.places[w] - motion[i, axis]
         gap = WALL_SENSES[w] * ahead
         if gap <= 0.0:  # the centre is beyond the wall: nothing pushes it back
             loads[i, axis] = np.inf
@@ -174,8 +233,8 @@ def wall_contacts(
         # The mirror image overlaps the grain twice as deep as the wall does, and does not spin.
         for a in range(3):
             block[_BRANCH + a * _SIZE + m] = 2.0 * ahead if a == axis else 0.0
-            block[_MOTION + a * _SIZE + m] = velocities[w, a] - state[i, 4 + a]
-            block[_SPIN_I + a * _SIZE + m] = state[i, 7 + a]
+            block[_MOTION + a * _SIZE + m] = walls.velocities[w, a] - motion[i, 4 + a]
+            block[_SPIN_I + a * _SIZE + m] = motion[i, 7 + a]
             block[_SPIN_J + a * _SIZE + m] = 0.0
             block[_SHEAR + a * _SIZE + m] = shear[c, a]
         block[_RADIUS + m] = r
@@ -186,26 +245,26 @@ def wall_contacts(
         m += 1
         if m == _SIZE:
             _contact_law(m, dt, block)
-            dissipated += _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads)
+            dissipated += _hand_to_walls(m, block, pair, pairs, loads, wall_loads)
             m = 0
     _contact_law(m, dt, block)
-    return dissipated + _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads)
+    return dissipated + _hand_to_walls(m, block, pair, pairs, loads, wall_loads)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _hand_to_walls(m, block, pair, wall_pairs, stiffness, shear, loads, wall_loads):
-    """Add what a block has found to the loads of its grains and walls."""
+def _hand_to_walls(m, block, pair, pairs, loads, wall_loads):
+    """Add what a block has found to the loads of its grains and walls; returns the energy dissipated."""
     dissipated = 0.0
     for k in range(m):
         c = pair[k]
-        i = wall_pairs[c, 0]
-        w = wall_pairs[c, 1]
+        i = pairs.members[c, 0]
+        w = pairs.members[c, 1]
         for a in range(3):
-            shear[c, a] = block[_SHEAR + a * _SIZE + k]
+            pairs.shear[c, a] = block[_SHEAR + a * _SIZE + k]
             loads[i, a] += block[_FORCE + a * _SIZE + k]
             loads[i, 3 + a] += block[_TORQUE_I + a * _SIZE + k]
             wall_loads[w, a] -= block[_FORCE + a * _SIZE + k]
-        wall_loads[w, 3] += stiffness[c]
+        wall_loads[w, 3] += pairs.stiffness[c]
         dissipated += block[_SLID + k]
     return dissipated
 

@@ -8,19 +8,28 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numba import get_num_threads
 
-from porefv.dem.contacts import grain_contacts, wall_contacts
+from porefv.dem.contacts import StepParameters
+from porefv.dem.grain_state import GrainState
 from porefv.dem.material import Material
-from porefv.dem.measurements import Contacts, Energies
-from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, advance, wall_excess
+from porefv.dem.measurements import Contacts, Energies, contact_loads
+from porefv.dem.motion import (
+    CROWDED,
+    FORCES,
+    MOTION,
+    RUNAWAY,
+    WHOLE,
+    Loads,
+    advance,
+    free_motion,
+)
+from porefv.dem.pair_listing import list_pairs, set_stiffness
 from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
-from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES, WALLS, Box
+from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS, Box
 from porefv.packing.neighbours import neighbour_pairs
 from porefv.packing.packing import Packing
-from porefv.system.kernels import njit
 from porefv.system.number_checks import check_number
 from porefv.system.threads import threads
-from porefv.tessellation.ordering import morton_codes
 
 # The step, as a part of the critical one √(m/k): motion was stable to 0.85 of it or more in a dense packing, whatever
 # its friction (benchmarks/dem.py).
@@ -29,8 +38,6 @@ SAFETY = 0.5
 _RUNAWAY = 0.1
 # Part of the way to balance, by the stiffness of its contacts, that a pressing wall moves in one step.
 _GAIN = 0.8
-# Part of the smallest radius that grains may come closer before pairs are listed anew.
-_SKIN = 0.2
 
 
 class DEM:
@@ -55,10 +62,11 @@ class DEM:
 
     Attributes
     ----------
-    applied : (n, 3) array
-        Force on each grain from outside, by id, kept until changed [N].
-    steps : int
-        Steps taken.
+    state : GrainState
+        Everything that it holds between two steps, besides its parameters: `material`, `plates` by wall, `gravity`,
+        `damping`, `step` and `threads`.
+    halfway : bool
+        Whether `predict` has begun a step that `correct` must end.
 
     Raises
     ------
@@ -96,28 +104,8 @@ class DEM:
             raise InputError(f"threads must be a whole number, 1 or more, not {threads!r}")
         self.threads = most if threads is not None else max(1, min(most, n // 1000))
 
-        # Inside, grains are numbered along a space-filling curve: near in space, near in memory.
-        self._order = np.argsort(morton_codes(np.asarray(packing.centres)), kind="stable")
-        self._rank = np.empty(n, np.int64)
-        self._rank[self._order] = np.arange(n)
-        self._state = np.zeros((n, 10))
-        self._state[:, :3] = packing.centres[self._order]
-        self._state[:, 3] = packing.radii[self._order]
-        self._applied = np.zeros((n, 3))
-        self.places = packing.box.wall_places
-        self.wall_velocities = np.zeros((6, 3))
-        self._wall_forces, self._wall_yields = np.zeros((6, 3)), np.zeros(6)
-        self._pairs, self._others = np.empty((0, 2), np.int32), np.empty(0, np.int32)
-        self._shear, self._touching = np.empty((0, 3)), np.empty(0, bool)
-        self._wall_pairs = np.empty((0, 2), np.int32)
-        self._wall_pair_shear, self._wall_pair_touching = np.empty((0, 3)), np.empty(0, bool)
-        self._work = np.zeros(3)
-        self._applied_work = 0.0
-        self._loads = np.zeros((self.threads, n, 6))
-        self._wall_loads = np.zeros((self.threads, 6, 4))
-        self._halfway = False
-        self.steps = 0
-        self.time = 0.0
+        self.state = GrainState.of(packing)
+        self._make_room()
         self.set_plates(plates or {})
         self._measure_grains()
         critical = self.critical_step
@@ -132,6 +120,41 @@ class DEM:
         self.step = float(step)
         self.list_pairs()
 
+    @classmethod
+    def from_state(
+        cls,
+        state: GrainState,
+        material: Material,
+        plates: Mapping[str, Plate],
+        *,
+        gravity: Sequence[float],
+        damping: float,
+        step: float,
+        threads: int,
+    ) -> DEM:
+        """The DEM that goes on from a state, to the last bit, with the parameters that belong to it.
+
+        Parameters
+        ----------
+        state : GrainState
+            Taken as it is, not copied.
+        material, plates, gravity, damping, step, threads
+            As of `DEM`, and as they were: stiffnesses and masses, and what plates do, are in the state.
+        """
+        dem = cls.__new__(cls)
+        dem.material, dem.plates = material, {name: plates[name] for name in WALLS}
+        dem.gravity, dem.damping = np.array(gravity, float), damping
+        dem.step, dem.threads = step, threads
+        dem.state = state
+        dem._make_room()
+        return dem
+
+    def _make_room(self) -> None:
+        self._smallest = float(self.state.grains.motion[:, 3].min())
+        # Loads of contacts: zero between two steps.
+        self._contact_loads = np.zeros((self.threads, len(self), 6)), np.zeros((self.threads, 6, 4))
+        self.halfway = False
+
     # ---- set-up -------------------------------------------------------------------------------------------------
 
     def set_plates(self, plates: Mapping[str, Plate]) -> None:
@@ -140,10 +163,11 @@ class DEM:
         if unknown:
             raise InputError(f"unknown wall {sorted(unknown)[0]!r}; known: {', '.join(WALLS)}")
         self.plates = {name: plates.get(name, Plate()) for name in WALLS}
-        self.wall_velocities[:] = [plate.velocity for plate in self.plates.values()]
-        self._targets = np.array([np.nan if p.stress is None else p.stress for p in self.plates.values()])
-        self._top_speeds = np.array([p.top_speed or 0.0 for p in self.plates.values()])
-        self._wall_friction = np.array([math.tan(math.radians(p.friction_angle)) for p in self.plates.values()])
+        walls = self.state.walls
+        walls.velocities[:] = [plate.velocity for plate in self.plates.values()]
+        walls.targets[:] = [np.nan if plate.stress is None else plate.stress for plate in self.plates.values()]
+        walls.top_speeds[:] = [plate.top_speed or 0.0 for plate in self.plates.values()]
+        walls.friction[:] = [math.tan(math.radians(plate.friction_angle)) for plate in self.plates.values()]
 
     def set_material(self, material: Material) -> None:
         """Change what the grains are made of, for instance their friction once a packing has its density."""
@@ -154,56 +178,35 @@ class DEM:
             raise InputError(f"the step of {self.step:.4g} s is above this material's critical one, {critical:.4g} s")
         self.material = material
         self._measure_grains()
-        self._stiffness = _pair_stiffness(material.young, self._pairs, self._state)
-        self._wall_pair_stiffness = material.young * self._state[self._wall_pairs[:, 0], 3]
+        set_stiffness(self.state, material.young)
 
     def scale_radii(self, factor: float) -> None:
         """Grow or shrink all grains about their centres; the step keeps its part of the critical one."""
         check_number(factor, "factor", "a positive number", lambda x: x > 0.0)
         part = self.step / self.critical_step
-        self._state[:, 3] *= factor
+        self.state.grains.motion[:, 3] *= factor
+        self._smallest = float(self.state.grains.motion[:, 3].min())
         self._measure_grains()
         self.step = part * self.critical_step
         self.list_pairs()
 
     def _measure_grains(self) -> None:
-        r = self._state[:, 3]
+        motion, inverse_mass, inverse_inertia = self.state.grains
+        r = motion[:, 3]
         mass = 4.0 / 3.0 * np.pi * r**3 * self.material.density
-        self._inverse_mass = 1.0 / mass
-        self._inverse_inertia = 1.0 / (0.4 * mass * r**2)
+        inverse_mass[:] = 1.0 / mass
+        inverse_inertia[:] = 1.0 / (0.4 * mass * r**2)
 
     @property
     def critical_step(self) -> float:
         """Least √(m/k) of a grain and the stiffest contact it may have, with the largest grain [s]."""
-        r = self._state[:, 3]
+        r = self.state.grains.motion[:, 3]
         stiffest = 2.0 * self.material.young * r * r.max() / (r + r.max())
-        return float(np.sqrt(1.0 / (self._inverse_mass * stiffest)).min())
+        return float(np.sqrt(1.0 / (self.state.grains.inverse_mass * stiffest)).min())
 
     def list_pairs(self) -> None:
-        """List the pairs that may touch before any grain has moved by half the skin, and keep what contacts hold."""
-        x, r = np.ascontiguousarray(self._state[:, :3]), np.ascontiguousarray(self._state[:, 3])
-        skin = _SKIN * float(r.min())
-        pairs = neighbour_pairs(x, r, skin)
-        shear, touching = np.zeros((len(pairs), 3)), np.zeros(len(pairs), bool)
-        _carry(self._pairs, self._shear, self._touching, pairs, shear, touching)
-        near = np.stack([x - self.places[0::2] < r[:, None] + skin, self.places[1::2] - x < r[:, None] + skin], axis=2)
-        wall_pairs = np.ascontiguousarray(np.argwhere(near.reshape(-1, 6)), dtype=np.int32)
-        wall_shear, wall_touching = np.zeros((len(wall_pairs), 3)), np.zeros(len(wall_pairs), bool)
-        _carry(
-            self._wall_pairs, self._wall_pair_shear, self._wall_pair_touching, wall_pairs, wall_shear, wall_touching
-        )  # fmt: skip
-        self._pairs, self._shear, self._touching = pairs, shear, touching
-        self._wall_pairs, self._wall_pair_shear, self._wall_pair_touching = wall_pairs, wall_shear, wall_touching
-        self._stiffness = _pair_stiffness(self.material.young, pairs, self._state)
-        self._wall_pair_stiffness = self.material.young * r[wall_pairs[:, 0]]
-        # Pairs of each grain with later ones, in a row; for each thread a range of grains with about as many pairs.
-        self._starts = np.searchsorted(pairs[:, 0], np.arange(len(self) + 1))
-        self._others = np.ascontiguousarray(pairs[:, 1])
-        self._grain_ranges = np.searchsorted(self._starts, np.linspace(0, len(pairs), self.threads + 1))
-        self._grain_ranges[-1] = len(self)
-        self._wall_pair_ranges = np.linspace(0, len(wall_pairs), self.threads + 1).astype(np.int64)
-        self._start, self._wall_start = x, self.places.copy()
-        self._slack = skin
+        """List the pairs that may touch before any grain has moved by half the margin, and keep what contacts hold."""
+        list_pairs(self.state, self.material.young, self.threads)
 
     # ---- motion -------------------------------------------------------------------------------------------------
 
@@ -215,14 +218,15 @@ class DEM:
         ComputationError
             If the motion runs away: a grain crosses a tenth of the smallest radius in one step, or is nowhere.
         """
-        if self._halfway:
+        if self.halfway:
             raise InputError("a step is half taken: finish it with `correct` before the next")
-        before = self._state[:, :3].copy() if self._applied.any() else None
+        state = self.state
+        before = state.grains.motion[:, :3].copy() if state.applied.any() else None
         done = 0
         while done < steps:
-            done += self._advance(WHOLE, steps - done, self._applied, np.zeros(6))
+            done += self._advance(WHOLE, steps - done, state.applied, np.zeros(6))
         if before is not None:
-            self._applied_work += float((self._applied * (self._state[:, :3] - before)).sum())
+            state.applied_work += float((state.applied * (state.grains.motion[:, :3] - before)).sum())
 
     def predict(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Take the first half of a step: contact forces, but no motion; `correct` takes the other.
@@ -244,15 +248,13 @@ class DEM:
         """
         if self.damping > 0.0:
             raise InputError("damping is for dry preparation: set it to 0 where a fluid moves with the grains")
-        if not self._halfway:
-            self._advance(FORCES, 1, self._applied, np.zeros(6))
-            self._halfway = True
-        mobilities = self.step * self._inverse_mass
-        velocities = _free_velocities(self._state, self._loads, self._applied, mobilities, self.step * self.gravity)
-        speeds = self.wall_velocities[np.arange(6), WALL_AXES] * WALL_SENSES
-        for w in np.flatnonzero(~np.isnan(self._targets)):
-            speeds[w] = self._wall_yields[w] * wall_excess(w, self.places, self._targets, self._wall_forces)
-        return velocities, speeds, mobilities, self._wall_yields
+        state = self.state
+        if not self.halfway:
+            self._advance(FORCES, 1, state.applied, np.zeros(6))
+            self.halfway = True
+        loads = Loads(*self._contact_loads, state.applied, np.zeros(6))
+        velocities, speeds, mobilities = free_motion(self._parameters(), state.grains, state.walls, loads)
+        return velocities, speeds, mobilities, state.walls.yields
 
     def correct(self, forces: np.ndarray, thrusts: np.ndarray) -> None:
         """Take the second half of a step, after `predict`, under forces on grains and walls besides all others.
@@ -264,43 +266,46 @@ class DEM:
         thrusts : (6,) array
             On the walls, along their outward normals [N].
         """
-        if not self._halfway:
+        if not self.halfway:
             raise InputError("`correct` ends a step that `predict` has begun")
-        self._halfway = False
-        self._advance(MOTION, 1, self._applied + forces, np.asarray(thrusts, float))
-        self._applied_work += self.step * float(np.vdot(self._applied + forces, self._state[:, 4:7]))
+        self.halfway = False
+        applied = self.state.applied + forces
+        self._advance(MOTION, 1, applied, np.asarray(thrusts, float))
+        self.state.applied_work += self.step * float(np.vdot(applied, self.state.grains.motion[:, 4:7]))
 
     def _advance(self, half: int, steps: int, applied: np.ndarray, thrusts: np.ndarray) -> int:
         """Take steps until pairs must be listed anew; returns how many."""
+        state = self.state
+        loads = Loads(*self._contact_loads, applied, thrusts)
         with threads(self.threads):
             taken, reason = advance(
-                steps, half, self.step, self._state, self._inverse_mass, self._inverse_inertia, applied,
-                self.gravity, self.damping,
-                self._starts, self._others, self._stiffness, self._shear, self._touching, self._grain_ranges,
-                self._wall_pairs, self._wall_pair_stiffness, self._wall_pair_shear, self._wall_pair_touching,
-                self._wall_pair_ranges,
-                self.material.stiffness_ratio, self.material.friction, self._wall_friction,
-                self.places, self.wall_velocities, self._targets, self._top_speeds, _GAIN, self._wall_yields, thrusts,
-                self._loads, self._wall_loads, self._wall_forces, self._start, self._wall_start, self._slack,
-                self.fastest, self._work,
+                steps, half, self._parameters(), state.grains, state.pairs, state.wall_pairs, state.walls,
+                state.listing, loads, state.work,
             )  # fmt: skip
-        self.steps += taken
-        self.time += taken * self.step
+        state.steps += taken
+        state.time += taken * self.step
         if reason == RUNAWAY:
             self._fail()
         if reason == CROWDED:
             self.list_pairs()
         return taken
 
+    def _parameters(self) -> StepParameters:
+        material = self.material
+        return StepParameters(
+            self.step, material.stiffness_ratio, material.friction, self.gravity, float(self.damping), _GAIN,
+            self.fastest,
+        )  # fmt: skip
+
     @property
     def moved_since_listing(self) -> float:
         """Largest distance that a grain has moved since the pairs that may touch were listed [m]."""
-        return float(np.sqrt(((self._state[:, :3] - self._start) ** 2).sum(axis=1).max()))
+        return float(np.sqrt(((self.state.grains.motion[:, :3] - self.state.listing.centres) ** 2).sum(axis=1).max()))
 
     @property
     def fastest(self) -> float:
         """Speed at which the motion counts as runaway [m/s]."""
-        return _RUNAWAY * float(self._state[:, 3].min()) / self.step
+        return _RUNAWAY * self._smallest / self.step
 
     def run_to_rest(self, unbalanced: float = 1e-3, stress: float = 1e-2, most: int = 200_000) -> int:
         """Take steps until the grains are at rest and walls press with their stresses; returns how many.
@@ -346,15 +351,16 @@ class DEM:
         return None
 
     def _fail(self) -> None:
-        speed = np.sqrt((self._state[:, 4:7] ** 2).sum(axis=1))
+        state = self.state
+        speed = np.sqrt((state.grains.motion[:, 4:7] ** 2).sum(axis=1))
         worst = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
         if np.isinf(speed[worst]):
             raise ComputationError(
-                f"grain {self._order[worst]} has left the box at step {self.steps}: its centre has passed a wall. "
+                f"grain {state.order[worst]} has left the box at step {state.steps}: its centre has passed a wall. "
                 "Walls yield like grains, k = E r: a larger young, a slower wall or less load keeps them apart"
             )
         raise ComputationError(
-            f"the motion runs away at step {self.steps}: grain {self._order[worst]} moves at {speed[worst]:.3g} m/s, "
+            f"the motion runs away at step {state.steps}: grain {state.order[worst]} moves at {speed[worst]:.3g} m/s, "
             f"over {_RUNAWAY} of the smallest radius in one step. A start with deep overlaps, a wall that is too fast "
             "or forces applied from outside that grow do this; so does a step near the critical one. Grains that are "
             "fast for their stiffness need a larger young, or a smaller step"
@@ -365,54 +371,75 @@ class DEM:
         forces = np.asarray(forces, float)
         if forces.shape != (len(self), 3) or not np.isfinite(forces).all():
             raise InputError(f"forces must be ({len(self)}, 3) finite numbers, one row per grain")
-        self._applied = np.ascontiguousarray(forces[self._order])
+        self.state.applied = np.ascontiguousarray(forces[self.state.order])
 
     @property
     def applied(self) -> np.ndarray:
-        return self._applied[self._rank]
+        """(n, 3): force on each grain from outside, by id, kept until changed [N]."""
+        return self.state.applied[self.state.rank]
 
     # ---- what there is ------------------------------------------------------------------------------------------
 
     def __len__(self) -> int:
-        return len(self._state)
+        return len(self.state)
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+        return self.state.steps
+
+    @property
+    def time(self) -> float:
+        """t [s]."""
+        return self.state.time
+
+    @property
+    def places(self) -> np.ndarray:
+        """(6,): coordinate of each wall along its axis [m]."""
+        return self.state.walls.places
+
+    @property
+    def wall_velocities(self) -> np.ndarray:
+        """(6, 3): velocities of the walls over the last step [m/s]."""
+        return self.state.walls.velocities
 
     @property
     def positions(self) -> np.ndarray:
         """(n, 3): centres at time t [m]."""
-        return self._state[self._rank, :3]
+        return self.state.grains.motion[self.state.rank, :3]
 
     @property
     def rows(self) -> np.ndarray:
         """(n,): row of each grain in the arrays of `predict` and `correct`."""
-        return self._rank
+        return self.state.rank
 
     @property
     def radii(self) -> np.ndarray:
         """(n,): radii [m]."""
-        return self._state[self._rank, 3]
+        return self.state.grains.motion[self.state.rank, 3]
 
     @property
     def velocities(self) -> np.ndarray:
         """(n, 3): velocities at time t - dt/2 [m/s]."""
-        return self._state[self._rank, 4:7]
+        return self.state.grains.motion[self.state.rank, 4:7]
 
     @velocities.setter
     def velocities(self, values: np.ndarray) -> None:
-        self._state[:, 4:7] = np.broadcast_to(values, (len(self), 3))[self._order]
+        self.state.grains.motion[:, 4:7] = np.broadcast_to(values, (len(self), 3))[self.state.order]
 
     @property
     def spins(self) -> np.ndarray:
         """(n, 3): angular velocities at time t - dt/2 [rad/s]."""
-        return self._state[self._rank, 7:10]
+        return self.state.grains.motion[self.state.rank, 7:10]
 
     @spins.setter
     def spins(self, values: np.ndarray) -> None:
-        self._state[:, 7:10] = np.broadcast_to(values, (len(self), 3))[self._order]
+        self.state.grains.motion[:, 7:10] = np.broadcast_to(values, (len(self), 3))[self.state.order]
 
     @property
     def masses(self) -> np.ndarray:
         """(n,): masses [kg]."""
-        return 1.0 / self._inverse_mass[self._rank]
+        return 1.0 / self.state.grains.inverse_mass[self.state.rank]
 
     @property
     def box(self) -> Box:
@@ -427,46 +454,12 @@ class DEM:
     @property
     def porosity(self) -> float:
         """1 - Σ 4/3 π r³ / V: overlaps count twice, as they weigh."""
-        return 1.0 - float((4.0 / 3.0 * np.pi * self._state[:, 3] ** 3).sum()) / self.box.volume
+        return 1.0 - float((4.0 / 3.0 * np.pi * self.state.grains.motion[:, 3] ** 3).sum()) / self.box.volume
 
     @property
     def contacts(self) -> Contacts:
         """Contacts between grains, and then between grains and walls."""
-        x, r = self._state[:, :3], self._state[:, 3]
-        held = np.flatnonzero(self._overlaps() > 0.0)
-        i, j = self._pairs[held].T
-        branch = x[j] - x[i]
-        distance = np.sqrt((branch**2).sum(axis=1))
-        normals = branch / distance[:, None]
-        overlaps = r[i] + r[j] - distance
-        forces = _across(self._shear[held], normals) - (self._stiffness[held] * overlaps)[:, None] * normals
-        points = x[i] + (r[i] - 0.5 * overlaps)[:, None] * normals
-
-        walled = np.flatnonzero(self._wall_pair_overlaps() > 0.0)
-        k, w = self._wall_pairs[walled].T
-        wall_normals = WALL_NORMALS[w]
-        wall_overlaps = self._wall_pair_overlaps()[walled]
-        wall_forces = _across(self._wall_pair_shear[walled], wall_normals)
-        wall_forces -= (self._wall_pair_stiffness[walled] * wall_overlaps)[:, None] * wall_normals
-        wall_points = x[k] + (r[k] - wall_overlaps)[:, None] * wall_normals
-        return Contacts(
-            np.concatenate(
-                [self._order[self._pairs[held]], np.stack([self._order[k], len(self) + w.astype(np.int64)], axis=1)]
-            ),
-            np.concatenate([normals, wall_normals]),
-            np.concatenate([points, wall_points]),
-            np.concatenate([forces, wall_forces]),
-            np.concatenate([overlaps, wall_overlaps]),
-        )
-
-    def _overlaps(self) -> np.ndarray:
-        x, r = self._state[:, :3], self._state[:, 3]
-        i, j = self._pairs.T
-        return r[i] + r[j] - np.sqrt(((x[j] - x[i]) ** 2).sum(axis=1))
-
-    def _wall_pair_overlaps(self) -> np.ndarray:
-        k, w = self._wall_pairs.T
-        return self._state[k, 3] - WALL_SENSES[w] * (self.places[w] - self._state[k, WALL_AXES[w]])
+        return Contacts.of(self.state)
 
     @property
     def coordination(self) -> float:
@@ -495,7 +488,7 @@ class DEM:
     @property
     def last_wall_forces(self) -> np.ndarray:
         """(6, 3): force of the grains on each wall over the last step, from t - dt to t [N]."""
-        return self._wall_forces.copy()
+        return self.state.walls.forces.copy()
 
     @property
     def wall_stress(self) -> dict[str, float]:
@@ -510,54 +503,17 @@ class DEM:
         if len(contacts) == 0:
             return math.inf
         mean = float(np.sqrt((contacts.forces**2).sum(axis=1)).mean())
-        loads = self._forces()
-        total = loads[:, :3] + self._applied + self.gravity / self._inverse_mass[:, None]
+        loads = contact_loads(self.state, self._parameters())
+        total = loads[:, :3] + self.state.applied + self.gravity / self.state.grains.inverse_mass[:, None]
         return float(np.sqrt((total**2).sum(axis=1)).mean()) / mean
 
     @property
     def energies(self) -> Energies:
         """Energies at time t."""
-        s = self._state
-        loads = self._forces()
-        accelerations = (loads[:, :3] + self._applied) * self._inverse_mass[:, None] + self.gravity
-        turns = loads[:, 3:] * self._inverse_inertia[:, None]
-        v, w = s[:, 4:7], s[:, 7:10]
-        kinetic = 0.5 * ((v * (v + self.step * accelerations)).sum(axis=1) / self._inverse_mass).sum()
-        kinetic += 0.5 * ((w * (w + self.step * turns)).sum(axis=1) / self._inverse_inertia).sum()
-        elastic = 0.0
-        for overlaps, shear, stiffness in (
-            (self._overlaps(), self._shear, self._stiffness),
-            (self._wall_pair_overlaps(), self._wall_pair_shear, self._wall_pair_stiffness),
-        ):
-            elastic += 0.5 * float((stiffness * np.maximum(overlaps, 0.0) ** 2).sum())
-            if self.material.stiffness_ratio > 0.0:
-                tangential = self.material.stiffness_ratio * stiffness
-                elastic += 0.5 * float(((shear**2).sum(axis=1) / tangential)[overlaps > 0.0].sum())
-        potential = -float(((s[:, :3] @ self.gravity) / self._inverse_mass).sum())
-        sliding, walls, damped = self._work
-        return Energies(float(kinetic), elastic, potential, sliding, damped, walls, self._applied_work)
-
-    def _forces(self) -> np.ndarray:
-        """Contact loads on grains (n, 6), inside numbering; tangential forces as they stand."""
-        loads = np.zeros((len(self), 6))
-        grain_contacts(
-            0, len(self), self._state, self._starts, self._others, self._stiffness, self.material.stiffness_ratio,
-            self.material.friction, 0.0, self._shear.copy(), self._touching.copy(), loads,
-        )  # fmt: skip
-        wall_contacts(
-            0, len(self._wall_pairs), self._state, self._wall_pairs, self._wall_pair_stiffness,
-            self.material.stiffness_ratio, self._wall_friction, 0.0, self.places, self.wall_velocities,
-            self._wall_pair_shear.copy(), self._wall_pair_touching.copy(), loads, np.zeros((6, 4)),
-        )  # fmt: skip
-        return loads
+        return Energies.of(self.state, self._parameters())
 
     def __repr__(self) -> str:
         return f"DEM({len(self)} grains, {self.steps} steps of {self.step:.3g} s, porosity {self.porosity:.4f})"
-
-
-def _across(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Tangential forces, known in the plane of a step ago, in the plane of now."""
-    return vectors - (vectors * normals).sum(axis=1)[:, None] * normals
 
 
 def _check_grains(packing: Packing) -> None:
@@ -579,42 +535,3 @@ def _check_grains(packing: Packing) -> None:
             f"grains {i[pair]} and {j[pair]} overlap by {depth[pair]:.3g} m, more than the smaller's radius: contact "
             "forces would throw them apart. Start from grains apart, or grow them (porefv.dem.grow)"
         )
-
-
-@njit(cache=True)
-def _free_velocities(state, loads, applied, mobilities, fall):
-    """Velocities after a step under the loads there are; `fall` is what gravity adds."""
-    velocities = np.empty((state.shape[0], 3))
-    for i in range(state.shape[0]):
-        for a in range(3):
-            force = applied[i, a]
-            for s in range(loads.shape[0]):
-                force += loads[s, i, a]
-            velocities[i, a] = state[i, 4 + a] + mobilities[i] * force + fall[a]
-    return velocities
-
-
-@njit(cache=True)
-def _pair_stiffness(young, pairs, state):
-    """k_n = 2 E r_i r_j / (r_i + r_j) of each pair (C14 eq. 10)."""
-    stiffness = np.empty(pairs.shape[0])
-    for c in range(pairs.shape[0]):
-        a = state[pairs[c, 0], 3]
-        b = state[pairs[c, 1], 3]
-        stiffness[c] = 2.0 * young * a * b / (a + b)
-    return stiffness
-
-
-@njit(cache=True)
-def _carry(old_pairs, old_shear, old_touching, pairs, shear, touching):
-    """Hand what contacts hold from one sorted list of pairs to another."""
-    o = 0
-    for c in range(pairs.shape[0]):
-        while o < old_pairs.shape[0] and (
-            old_pairs[o, 0] < pairs[c, 0] or (old_pairs[o, 0] == pairs[c, 0] and old_pairs[o, 1] < pairs[c, 1])
-        ):
-            o += 1
-        if o < old_pairs.shape[0] and old_pairs[o, 0] == pairs[c, 0] and old_pairs[o, 1] == pairs[c, 1]:
-            touching[c] = old_touching[o]
-            for a in range(3):
-                shear[c, a] = old_shear[o, a]

@@ -7,7 +7,6 @@ The functions that it calls can be used without it: `throat_conductances`, `solv
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from functools import cached_property
 from types import NoneType
@@ -38,6 +37,7 @@ from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
 from porefv.solvers.solver import TOLERANCE, SolverReport
 from porefv.system.number_checks import MOST, ensure_finite
+from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
     from porefv.fipy.pressure_problem import FipyProblem
@@ -169,7 +169,7 @@ class PoreFlow:
     @cached_property
     def conductances(self) -> np.ndarray:
         """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
-        with self._timed("throats"):
+        with Timer(self.timings, "throats"):
             return throat_conductances(self.mesh, self.conductance, self.walls.slip, self.fluid.viscosity)
 
     @cached_property
@@ -178,7 +178,7 @@ class PoreFlow:
         if self._given is not None:
             return self._given
         conductances = self.conductances
-        with self._timed("solve"):
+        with Timer(self.timings, "solve"):
             return solve_pressure(self.mesh, conductances, self.walls, solver=self.solver, tolerance=self.tolerance)
 
     @cached_property
@@ -298,7 +298,7 @@ class PoreFlow:
     def forces(self) -> Forces:
         """Forces on every sphere and wall."""
         _ = self.solution  # timed by itself
-        with self._timed("forces"):
+        with Timer(self.timings, "forces"):
             forces = grain_forces(
                 self.mesh,
                 self._acting,
@@ -318,21 +318,7 @@ class PoreFlow:
 
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 
-    def _timed(self, stage: str) -> _Timer:
-        return _Timer(self.timings, stage)
-
     def __repr__(self) -> str:
         held = ", ".join(f"{name} {wall.pressure:g} Pa" for name, wall in zip(WALLS, self.walls, strict=True)
                          if wall.pressure is not None)  # fmt: skip
         return f"PoreFlow({self.mesh!r}, {self.conductance.name}, {held})"
-
-
-class _Timer:
-    def __init__(self, timings: dict[str, float], stage: str):
-        self.timings, self.stage = timings, stage
-
-    def __enter__(self) -> None:
-        self.begin = time.perf_counter()
-
-    def __exit__(self, *_: object) -> None:
-        self.timings[self.stage] = time.perf_counter() - self.begin

@@ -12,6 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from porefv.conductance.model import ConductanceModel
 from porefv.coupling import checkpoint as coupled_checkpoint
 from porefv.coupling.coupling import Coupling
 from porefv.dem import checkpoint as dry_checkpoint
@@ -121,13 +122,13 @@ class RunRecord:
                 with suppress(OSError):
                     (directory / name).unlink()
 
-    def load(self, directory: Path) -> tuple[DEM, Coupling | None]:
-        """The state of the checkpoint."""
+    def load(self, directory: Path, conductance: ConductanceModel | None = None) -> tuple[DEM, Coupling | None]:
+        """The state of the checkpoint; the conductance model, of a coupling, as for its `checkpoint.load`."""
         assert self.checkpoint is not None
         path = directory / self.checkpoint.file
         if not self.checkpoint.coupled:
             return dry_checkpoint.load(path), None
-        coupling = coupled_checkpoint.load(path)
+        coupling = coupled_checkpoint.load(path, conductance)
         assert isinstance(coupling.grains, DEM)  # no other can be saved
         return coupling.grains, coupling
 

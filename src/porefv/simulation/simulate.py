@@ -85,7 +85,7 @@ def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, pr
         record = RunRecord(scene.data, str(scene.path) if scene.path else None, dem.box.size.tolist())
         running = _Run(scene, record, dem, None, progress)
     else:
-        dem, coupling = record.load(directory)
+        dem, coupling = record.load(directory, scene.coupling.conductance)
         record.scene, record.path = scene.data, str(scene.path) if scene.path else None
         running = _Run(scene, record, dem, coupling, progress)
     try:

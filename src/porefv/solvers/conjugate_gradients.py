@@ -1,23 +1,24 @@
-"""Conjugate gradients on a network, in fused kernels, judged by the flow that the nodes fail to conserve.
+"""Conjugate gradients: the iteration itself, and the pressures of a network to a bound on what its nodes lose.
 
-`conjugate_gradients` finds pressures in double precision. `refined` finds them as the sum of two doubles each: stiff
-throats then pass flows that differences of single doubles could not tell from nothing.
+`preconditioned_cg` iterates on any symmetric positive definite operator until a stopping rule is met.
+`conjugate_gradients` finds the pressures of a network in double precision. `refined` finds them as the sum of two
+doubles each: stiff throats then pass flows that differences of single doubles could not tell from nothing.
 
 Sums run over blocks of fixed size, so that results do not depend on the number of threads.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from porefv.solvers.network import Network
+from porefv.solvers.network import BLOCK, Network
 from porefv.system.kernels import njit, prange
 from porefv.system.threads import threads_for
 
-_BLOCK = 16384
 # By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
 _REACH = 1e-10
 MAX_ITERATIONS = 500
@@ -29,12 +30,84 @@ _EPSILON = float(np.finfo(float).eps)
 _LOOK_EVERY = 4
 
 
+class Operator(Protocol):
+    """A symmetric positive definite matrix A."""
+
+    def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
+        """aq = A q; returns q·aq."""
+        ...
+
+
 class Preconditioner(Protocol):
-    """What nearly inverts a network."""
+    """An approximate inverse M⁻¹ of an operator."""
 
     def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
         """z = M⁻¹ r; returns r·z. `y`, (n,), is room to work in."""
         ...
+
+
+class StoppingRule(Protocol):
+    """When the iteration ends. A rule may keep references to x and r, which change in place."""
+
+    def met_before(self, rz: float) -> bool:
+        """Whether to stop before the next iteration, given r·M⁻¹r."""
+        ...
+
+    def met_after(self, iterations: int, lost: float) -> bool:
+        """Whether to stop after so many iterations, given Σ|r|, before M⁻¹ is applied to r."""
+        ...
+
+
+def preconditioned_cg(
+    operator: Operator,
+    preconditioner: Preconditioner,
+    x: np.ndarray,
+    r: np.ndarray,
+    rule: StoppingRule,
+    limit: int,
+    room: np.ndarray | None = None,
+) -> tuple[int, bool]:
+    """Iterate on A x = b by preconditioned conjugate gradients (Hestenes and Stiefel 1952).
+
+    Parameters
+    ----------
+    operator, preconditioner
+        A and M⁻¹.
+    x : (n,) array
+        Start, and result.
+    r : (n,) array
+        b - A x of the start, and of the result but for rounding.
+    rule : StoppingRule
+    limit : int
+        Most iterations.
+    room : (4, n) array, optional
+        To work in.
+
+    Returns
+    -------
+    iterations : int
+    met : bool
+        Whether the rule is met. It is not after `limit` iterations, or where q·Aq or r·M⁻¹r is not positive: rounding
+        has then spoilt the factor, or the numbers are not finite.
+    """
+    # To start threads for a single block costs more than its numbers.
+    advance, redirect = (_advance_block, _redirect_block) if len(x) <= BLOCK else (_advance, _redirect)
+    q, aq, z, y = np.empty((4, len(x))) if room is None else room
+    rz = preconditioner.apply(r, z, y)
+    q[:] = z
+    iterations = 0
+    while not rule.met_before(rz):
+        if not rz > 0.0 or iterations >= limit:
+            return iterations, False
+        iterations += 1
+        power = operator.multiply(q, aq)
+        if not power > 0.0:
+            return iterations, False
+        if rule.met_after(iterations, advance(x, r, q, aq, rz / power)):
+            return iterations, True
+        before, rz = rz, preconditioner.apply(r, z, y)
+        redirect(q, z, rz / before)
+    return iterations, True
 
 
 def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -85,32 +158,23 @@ def _iterate(a, rhs, preconditioner, tolerance, guess):
         if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= MAX_ITERATIONS:
             return x, iterations
         before = lost
-        iterations += _descend(a, x, r, preconditioner, 0.0, enough, MAX_ITERATIONS - iterations)
+        rule = _ImbalanceRule(0.0, enough)
+        iterations += preconditioned_cg(a, preconditioner, x, r, rule, MAX_ITERATIONS - iterations)[0]
 
 
-def _descend(a, x, r, preconditioner, least, enough, limit):
-    """Iterate on x, whose residual is r, until Σ|r| is below `least` or what is `enough` now; returns how often."""
-    z, ap, room = np.empty((3, len(a)))
-    rz = preconditioner.apply(r, z, room)
-    p = z.copy()
-    target = least
-    iterations = 0
-    while iterations < limit:
-        iterations += 1
-        power = _multiply(a.starts, a.columns, a.links, a.leaks, p, ap)
-        if not power > 0.0:  # what is left is no number any more, or the factor is spoilt
-            break
-        lost = _advance(x, r, p, ap, rz / power)
+class _ImbalanceRule:
+    """Stop where Σ|r| is below `least`, or below what `enough` returns at every fourth iteration."""
+
+    def __init__(self, least: float, enough: Callable[[], float]):
+        self._least, self._enough, self._target = least, enough, least
+
+    def met_before(self, rz: float) -> bool:
+        return False
+
+    def met_after(self, iterations: int, lost: float) -> bool:
         if iterations % _LOOK_EVERY == 0:
-            target = max(least, enough())
-        if lost <= target:
-            break
-        new = preconditioner.apply(r, z, room)
-        if not new > 0.0:
-            break
-        _redirect(p, z, new / rz)
-        rz = new
-    return iterations
+            self._target = max(self._least, self._enough())
+        return lost <= self._target
 
 
 @dataclass(frozen=True)
@@ -210,57 +274,53 @@ def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
         flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
         return 0.5 * tolerance * flow
 
-    least = _REACH * float(np.abs(r).sum())
-    return d, _descend(a, d, r.copy(), preconditioner, least, enough, MAX_ITERATIONS)
+    rule = _ImbalanceRule(_REACH * float(np.abs(r).sum()), enough)
+    return d, preconditioned_cg(a, preconditioner, d, r.copy(), rule, MAX_ITERATIONS)[0]
 
 
 @njit(cache=True, parallel=True)
 def _flow_and_size(leaks, diagonal, rhs, x):
     """Σ|e x - b| and Σ d|x|."""
     n = x.shape[0]
-    flow = np.zeros((n + _BLOCK - 1) // _BLOCK)
+    flow = np.zeros((n + BLOCK - 1) // BLOCK)
     size = np.zeros(flow.shape[0])
     for block in prange(flow.shape[0]):
-        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
+        for i in range(block * BLOCK, min(block * BLOCK + BLOCK, n)):
             flow[block] += abs(leaks[i] * x[i] - rhs[i])
             size[block] += diagonal[i] * abs(x[i])
     return flow.sum(), size.sum()
 
 
 @njit(cache=True, parallel=True)
-def _multiply(starts, columns, links, leaks, p, ap):
-    """ap = A p; returns p·ap."""
-    n = p.shape[0]
-    parts = np.zeros((n + _BLOCK - 1) // _BLOCK)
-    for block in prange(parts.shape[0]):
-        total = 0.0
-        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
-            s = leaks[i] * p[i]
-            for k in range(starts[i], starts[i + 1]):
-                s += links[k] * (p[i] - p[columns[k]])
-            ap[i] = s
-            total += s * p[i]
-        parts[block] = total
-    return parts.sum()
-
-
-@njit(cache=True, parallel=True)
-def _advance(x, r, p, ap, alpha):
-    """x += α p, r -= α ap; returns Σ|r|."""
-    n = p.shape[0]
-    lost = np.zeros((n + _BLOCK - 1) // _BLOCK)
+def _advance(x, r, q, aq, alpha):
+    """x += α q, r -= α aq; returns Σ|r|."""
+    n = x.shape[0]
+    lost = np.zeros((n + BLOCK - 1) // BLOCK)
     for block in prange(lost.shape[0]):
-        total = 0.0
-        for i in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n)):
-            x[i] += alpha * p[i]
-            r[i] -= alpha * ap[i]
-            total += abs(r[i])
-        lost[block] = total
+        part = slice(block * BLOCK, min(block * BLOCK + BLOCK, n))
+        lost[block] = _advance_block(x[part], r[part], q[part], aq[part], alpha)
     return lost.sum()
 
 
+# The sum may be taken in any order: it is then formed four numbers at a time.
+@njit(cache=True, nogil=True, fastmath={"reassoc"})
+def _advance_block(x, r, q, aq, alpha):
+    lost = 0.0
+    for i in range(x.shape[0]):
+        x[i] += alpha * q[i]
+        r[i] -= alpha * aq[i]
+        lost += abs(r[i])
+    return lost
+
+
 @njit(cache=True, parallel=True)
-def _redirect(p, z, beta):
-    """p = z + β p."""
-    for i in prange(p.shape[0]):
-        p[i] = z[i] + beta * p[i]
+def _redirect(q, z, beta):
+    """q = z + β q."""
+    for i in prange(q.shape[0]):
+        q[i] = z[i] + beta * q[i]
+
+
+@njit(cache=True, nogil=True)
+def _redirect_block(q, z, beta):
+    for i in range(q.shape[0]):
+        q[i] = z[i] + beta * q[i]

@@ -12,6 +12,9 @@ from porefv.system.kernels import njit, prange
 if TYPE_CHECKING:
     from scipy import sparse
 
+# Sums run over blocks of so many nodes, so that they do not depend on the number of threads.
+BLOCK = 16384
+
 
 @dataclass(frozen=True, eq=False)
 class Network:
@@ -62,6 +65,10 @@ class Network:
     def __len__(self) -> int:
         return len(self.leaks)
 
+    def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
+        """aq = A q, from differences of q; returns q·aq."""
+        return _multiply(self.starts, self.columns, self.links, self.leaks, q, aq)
+
     def residual(self, rhs: np.ndarray, x: np.ndarray) -> np.ndarray:
         """b - A x, from differences of x: the imbalance of each node."""
         out = np.empty(len(self))
@@ -111,6 +118,23 @@ def _fill(pairs, weights, number, place, columns, links, diagonal):
         diagonal[b] += weights[t]
         place[a] += 1
         place[b] += 1
+
+
+@njit(cache=True, parallel=True)
+def _multiply(starts, columns, links, leaks, q, aq):
+    """aq = A q; returns q·aq."""
+    n = q.shape[0]
+    parts = np.zeros((n + BLOCK - 1) // BLOCK)
+    for block in prange(parts.shape[0]):
+        total = 0.0
+        for i in range(block * BLOCK, min(block * BLOCK + BLOCK, n)):
+            s = leaks[i] * q[i]
+            for k in range(starts[i], starts[i + 1]):
+                s += links[k] * (q[i] - q[columns[k]])
+            aq[i] = s
+            total += s * q[i]
+        parts[block] = total
+    return parts.sum()
 
 
 @njit(cache=True, parallel=True)

@@ -1,0 +1,217 @@
+"""GrainState: everything that a DEM holds between two steps, besides its parameters.
+
+The groups of arrays are named tuples: the kernels of `porefv.dem.contacts` and `porefv.dem.motion` take them as they
+are. Kernels on disk do not notice that fields of one dtype and shape have changed places here: whoever reorders fields
+deletes the `__pycache__` folders.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from porefv.dem.state_files import ArrayOf
+from porefv.packing.packing import Packing
+from porefv.tessellation.ordering import morton_codes
+
+
+class Grains(NamedTuple):
+    """Grains as rigid bodies, in inside numbering.
+
+    Attributes
+    ----------
+    motion : (n, 10) array
+        x y z r, vx vy vz, wx wy wz: centre [m] and radius [m] at time t, velocity [m/s] and spin [rad/s] at t - dt/2.
+    inverse_mass : (n,) array
+        [1/kg]
+    inverse_inertia : (n,) array
+        One over 2/5 m r² [1/(kg m²)].
+    """
+
+    motion: Annotated[np.ndarray, ArrayOf("f8", ("n", 10))]
+    inverse_mass: Annotated[np.ndarray, ArrayOf("f8", ("n",))]
+    inverse_inertia: Annotated[np.ndarray, ArrayOf("f8", ("n",))]
+
+
+class GrainPairs(NamedTuple):
+    """Pairs of grains i < j that may touch, sorted by i and then j.
+
+    Attributes
+    ----------
+    grains : (p, 2) int32 array
+        i, j.
+    starts : (n + 1,) int64 array
+        Pairs of grain i with later ones are starts[i] ... starts[i + 1] - 1.
+    others : (p,) int32 array
+        j.
+    stiffness : (p,) array
+        k_n [N/m].
+    shear : (p, 3) array
+        Tangential force on i, zero unless the pair touches [N].
+    touching : (p,) bool array
+        Whether the pair touches.
+    ranges : (s + 1,) int64 array
+        Grain at which the range of each thread starts.
+    """
+
+    grains: Annotated[np.ndarray, ArrayOf("i4", ("p", 2))]
+    starts: Annotated[np.ndarray, ArrayOf("i8", ("n + 1",))]
+    others: Annotated[np.ndarray, ArrayOf("i4", ("p",))]
+    stiffness: Annotated[np.ndarray, ArrayOf("f8", ("p",))]
+    shear: Annotated[np.ndarray, ArrayOf("f8", ("p", 3))]
+    touching: Annotated[np.ndarray, ArrayOf("?", ("p",))]
+    ranges: Annotated[np.ndarray, ArrayOf("i8", ("s + 1",))]
+
+
+class WallPairs(NamedTuple):
+    """Pairs of a grain and a wall that may touch, sorted by grain and then wall.
+
+    Attributes
+    ----------
+    members : (k, 2) int32 array
+        Grain, wall.
+    stiffness : (k,) array
+        k_n [N/m].
+    shear : (k, 3) array
+        Tangential force on the grain, zero unless the pair touches [N].
+    touching : (k,) bool array
+        Whether the pair touches.
+    ranges : (s + 1,) int64 array
+        Pair at which the range of each thread starts.
+    """
+
+    members: Annotated[np.ndarray, ArrayOf("i4", ("k", 2))]
+    stiffness: Annotated[np.ndarray, ArrayOf("f8", ("k",))]
+    shear: Annotated[np.ndarray, ArrayOf("f8", ("k", 3))]
+    touching: Annotated[np.ndarray, ArrayOf("?", ("k",))]
+    ranges: Annotated[np.ndarray, ArrayOf("i8", ("s + 1",))]
+
+
+class MovingWalls(NamedTuple):
+    """The six walls, in the order of `porefv.WALLS`.
+
+    Attributes
+    ----------
+    places : (6,) array
+        Coordinate of each along its axis [m].
+    velocities : (6, 3) array
+        Over the last step [m/s].
+    targets : (6,) array
+        Stress that a wall presses with, NaN for walls whose velocity is given [Pa].
+    top_speeds : (6,) array
+        Of walls that press, zero for the others [m/s].
+    friction : (6,) array
+        tan φ.
+    forces : (6, 3) array
+        Of the grains on each wall over the last step [N].
+    yields : (6,) array
+        What a force over the step adds to the outward velocity of a wall that presses, zero for the others [m/(s N)].
+    """
+
+    places: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+    velocities: Annotated[np.ndarray, ArrayOf("f8", (6, 3))]
+    targets: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+    top_speeds: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+    friction: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+    forces: Annotated[np.ndarray, ArrayOf("f8", (6, 3))]
+    yields: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+
+
+class Listing(NamedTuple):
+    """Where grains and walls were when the pairs that may touch were listed, and for how long the lists hold.
+
+    Attributes
+    ----------
+    centres : (n, 3) array
+        [m]
+    walls : (6,) array
+        [m]
+    slack : float
+        How much nearer the members of a pair may have come since [m].
+    """
+
+    centres: Annotated[np.ndarray, ArrayOf("f8", ("n", 3))]
+    walls: Annotated[np.ndarray, ArrayOf("f8", (6,))]
+    slack: float
+
+
+@dataclass
+class GrainState:
+    """Everything that a DEM holds between two steps, besides its parameters.
+
+    Sizes: n grains, p pairs of grains, k pairs of a grain and a wall, s threads. Inside, grains are numbered along a
+    space-filling curve: near in space, near in memory.
+
+    Attributes
+    ----------
+    order : (n,) int64 array
+        Id of each grain in inside numbering.
+    rank : (n,) int64 array
+        Number inside of the grain of each id.
+    grains : Grains
+    applied : (n, 3) array
+        Force on each grain from outside, in inside numbering [N].
+    pairs : GrainPairs
+    wall_pairs : WallPairs
+    walls : MovingWalls
+    listing : Listing
+    work : (3,) array
+        Since the start: dissipated by sliding, put in by walls, taken by damping [J].
+    applied_work : float
+        Put in by applied forces since the start [J].
+    steps : int
+        Taken since the start.
+    time : float
+        t [s].
+    """
+
+    order: Annotated[np.ndarray, ArrayOf("i8", ("n",))]
+    rank: Annotated[np.ndarray, ArrayOf("i8", ("n",))]
+    grains: Grains
+    applied: Annotated[np.ndarray, ArrayOf("f8", ("n", 3))]
+    pairs: GrainPairs
+    wall_pairs: WallPairs
+    walls: MovingWalls
+    listing: Listing
+    work: Annotated[np.ndarray, ArrayOf("f8", (3,))]
+    applied_work: float
+    steps: int
+    time: float
+
+    @classmethod
+    def of(cls, packing: Packing) -> GrainState:
+        """Grains at rest at time 0, in the box of a packing; masses, stiffnesses and pairs are still to be found."""
+        assert packing.box is not None  # a DEM has seen to it
+        n = len(packing)
+        order = np.argsort(morton_codes(np.asarray(packing.centres)), kind="stable")
+        rank = np.empty(n, np.int64)
+        rank[order] = np.arange(n)
+        motion = np.zeros((n, 10))
+        motion[:, :3] = packing.centres[order]
+        motion[:, 3] = packing.radii[order]
+        places = packing.box.wall_places
+        none, nothing, not_one = np.zeros((0, 2), np.int32), np.zeros(0), np.zeros(0, bool)
+        return cls(
+            order=order,
+            rank=rank,
+            grains=Grains(motion, np.zeros(n), np.zeros(n)),
+            applied=np.zeros((n, 3)),
+            pairs=GrainPairs(
+                none, np.zeros(n + 1, np.int64), none[:, 0].copy(), nothing, np.zeros((0, 3)), not_one,
+                np.zeros(2, np.int64),
+            ),
+            wall_pairs=WallPairs(none, nothing, np.zeros((0, 3)), not_one, np.zeros(2, np.int64)),
+            walls=MovingWalls(
+                places, np.zeros((6, 3)), np.full(6, np.nan), np.zeros(6), np.zeros(6), np.zeros((6, 3)), np.zeros(6)
+            ),
+            listing=Listing(motion[:, :3].copy(), places.copy(), 0.0),
+            work=np.zeros(3),
+            applied_work=0.0,
+            steps=0,
+            time=0.0,
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.order)
