@@ -166,7 +166,7 @@ def test_a_model_of_the_users_own_must_be_given_again(coupled, tmp_path):
         checkpoint.load(path, conductance=Cracks())
     with pytest.raises(InputError, match="'slits', not 'section-friction'"):
         checkpoint.load(path, conductance=SectionFriction())
-    with pytest.raises(InputError, match="derives from porefv.ConductanceModel, not Slits"):
+    with pytest.raises(InputError, match=r"must be an object, not a class: write Slits\(\)"):
         checkpoint.load(path, conductance=Slits)
 
 

@@ -27,6 +27,7 @@ from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS, Box
 from porefv.packing.neighbours import neighbour_pairs
+from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
 from porefv.system.number_checks import check_number
 from porefv.system.threads import threads
@@ -193,7 +194,7 @@ class DEM:
     def _measure_grains(self) -> None:
         motion, inverse_mass, inverse_inertia = self.state.grains
         r = motion[:, 3]
-        mass = 4.0 / 3.0 * np.pi * r**3 * self.material.density
+        mass = sphere_volumes(r) * self.material.density
         inverse_mass[:] = 1.0 / mass
         inverse_inertia[:] = 1.0 / (0.4 * mass * r**2)
 
@@ -454,7 +455,7 @@ class DEM:
     @property
     def porosity(self) -> float:
         """1 - Σ 4/3 π r³ / V: overlaps count twice, as they weigh."""
-        return 1.0 - float((4.0 / 3.0 * np.pi * self.state.grains.motion[:, 3] ** 3).sum()) / self.box.volume
+        return 1.0 - float(sphere_volumes(self.state.grains.motion[:, 3]).sum()) / self.box.volume
 
     @property
     def contacts(self) -> Contacts:

@@ -9,6 +9,7 @@ import numpy as np
 from porefv.dem.sizes import Sizes
 from porefv.errors import InputError
 from porefv.packing.box import Box
+from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
 from porefv.system.kernels import njit
 from porefv.system.number_checks import is_finite_number
@@ -40,7 +41,7 @@ def cloud(n: int, sizes: Sizes, box: Box, porosity: float, seed: int = 0) -> Pac
     check_porosity(porosity)
     rng = np.random.default_rng(_check_seed(seed))
     radii = sizes.draw(n, rng)
-    radii = radii * np.cbrt((1.0 - porosity) * box.volume / (4.0 / 3.0 * np.pi * (radii**3).sum()))
+    radii = radii * np.cbrt((1.0 - porosity) * box.volume / (sphere_volumes(1.0) * (radii**3).sum()))
     order = np.argsort(-radii, kind="stable")
     if 2.0 * radii.max() >= box.size.min():
         raise InputError(
@@ -49,7 +50,7 @@ def cloud(n: int, sizes: Sizes, box: Box, porosity: float, seed: int = 0) -> Pac
         )
     centres, placed = _place(radii[order], box.size, rng, _TRIES * n)
     if placed < n:
-        reached = 1.0 - 4.0 / 3.0 * np.pi * (radii[order][:placed] ** 3).sum() / box.volume
+        reached = 1.0 - sphere_volumes(radii[order][:placed]).sum() / box.volume
         raise InputError(
             f"a cloud of porosity {porosity:g} cannot be reached by placing grains at random: {placed} of {n} found "
             f"room, at porosity {reached:.3f}; ask for a higher porosity, or let grains grow or settle to it"

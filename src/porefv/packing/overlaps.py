@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import counted
 from porefv.packing.box import Floats
@@ -46,6 +46,11 @@ def cap_volume(radius: Floats, height: Floats) -> Floats:
     return np.pi * height**2 * (radius - height / 3)
 
 
+def sphere_volumes(radii: ArrayLike) -> Floats:
+    """Volumes of spheres, m³."""
+    return 4.0 / 3.0 * np.pi * np.asarray(radii, float) ** 3
+
+
 def lens_volume(r_i: Floats, r_j: Floats, distance: Floats) -> Floats:
     """Volume shared by two overlapping balls, m³: two caps, or the smaller ball if it lies in the larger."""
     depth = r_i + r_j - distance
@@ -55,4 +60,4 @@ def lens_volume(r_i: Floats, r_j: Floats, distance: Floats) -> Floats:
     h_i = depth * (r_j - r_i + distance) / twice
     h_j = depth * (r_i - r_j + distance) / twice
     lens = cap_volume(r_i, h_i) + cap_volume(r_j, h_j)
-    return np.where(engulfed, 4 / 3 * np.pi * np.minimum(r_i, r_j) ** 3, lens)
+    return np.where(engulfed, sphere_volumes(np.minimum(r_i, r_j)), lens)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import ComputationError, InputError, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
-from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume
+from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
 
 _MOST_SHOWN = 5  # culprits listed in one error
 
@@ -151,7 +151,7 @@ class Packing:
         """
         found = self.overlaps
         i, j = found.pairs.T
-        balls = 4 / 3 * np.pi * self.radii**3
+        balls = sphere_volumes(self.radii)
         lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
         caps = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
         return float(balls.sum() - lenses.sum() - caps.sum())

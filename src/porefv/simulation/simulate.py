@@ -19,6 +19,7 @@ from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, ComputationError, InputError
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.overlaps import sphere_volumes
 from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScene
 from porefv.scenes.stage import Rest, Stage
 from porefv.simulation import measurements
@@ -269,7 +270,7 @@ class _Run:
             self.coupling.set_walls(walls)
             return
         # Pressures are piezometric: the hydrostatic part of the fluid's force is that on the volume of a grain.
-        volumes = 4.0 / 3.0 * np.pi * dem.radii**3
+        volumes = sphere_volumes(dem.radii)
         dem.apply(-fluid.density * volumes[:, None] * dem.gravity)
         self.coupling = Coupling(dem, walls, fluid, options.conductance, **options.parameters)
 
