@@ -29,7 +29,7 @@ from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS, Box
 from porefv.packing.neighbours import neighbour_pairs
 from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
-from porefv.system.number_checks import check_number
+from porefv.system.number_checks import check_number, three_numbers
 from porefv.system.threads import threads
 
 # The step, as a part of the critical one √(m/k): motion was stable to 0.85 of it or more in a dense packing, whatever
@@ -92,9 +92,7 @@ class DEM:
         threads: int | None = None,
     ):
         self.material = material if material is not None else Material()
-        self.gravity = np.array(gravity, float)
-        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
-            raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
+        self.gravity = three_numbers(gravity, "gravity", "m/s²")
         check_number(damping, "damping", "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
         self.damping = float(damping)
         _check_grains(packing)

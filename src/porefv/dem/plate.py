@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from porefv.errors import InputError
-from porefv.system.number_checks import check_number
+from porefv.system.number_checks import check_number, three_numbers
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class Plate:
     friction_angle: float = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.velocity) != 3 or not all(math.isfinite(v) for v in self.velocity):
-            raise InputError(f"the velocity of a wall must be three finite numbers in m/s, not {self.velocity!r}")
+        three_numbers(self.velocity, "the velocity of a wall", "m/s")
         check_number(self.friction_angle, "friction_angle", "an angle from 0 to 89 degrees", lambda x: 0.0 <= x <= 89.0)
         if self.stress is not None:
             check_number(self.stress, "stress", "a stress in Pa, zero or more (compression)", lambda x: x >= 0.0)

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import ComputationError, InputError
 
@@ -20,15 +21,26 @@ def within_range(value: float) -> bool:
 
 def is_finite_number(value: object) -> bool:
     """Whether a value is a number, not a truth value, that a double can hold."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         return False
-    return abs(value) <= sys.float_info.max  # false for nan, and for integers that are no float
+    return bool(abs(value) <= sys.float_info.max)  # type: ignore[operator]  # false for nan, and for integers that are no float
 
 
 def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
     """InputError unless the value is a finite number for which that holds."""
     if not (is_finite_number(value) and holds(value)):  # type: ignore[arg-type]
         raise InputError(f"{name} must be {what}, not {value!r}")
+
+
+def three_numbers(values: ArrayLike, name: str, unit: str = "") -> NDArray[np.float64]:
+    """A vector (3,) as a new array; InputError unless it is three finite numbers."""
+    try:
+        found = np.array(values, float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise InputError(f"{name} must be three finite numbers{f' in {unit}' if unit else ''}, not {values!r}")
+    return found
 
 
 def ensure_finite(values: np.ndarray, what: str) -> np.ndarray:
