@@ -13,6 +13,7 @@ python benchmarks/accuracy.py all --out docs/img    # draws the figures, too
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 from dataclasses import dataclass
 from functools import cached_property
@@ -295,7 +296,7 @@ def by_shape(found: list[Case]) -> None:
     print("\ninterior throats, by length over the radius of the neck's area: resolved over computed resistance")
     print(f"{'L / radius':14}{'number':>8}{'hydraulic-radius':>24}{'section-friction':>24}")
     print(f"{'':22}{'at vertices':>14}{'mean':>10}{'at vertices':>14}{'mean':>10}")
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         sums = rows[(rows[:, 0] >= low) & (rows[:, 0] < high)]
         total = sums.sum(axis=0)
         ratios = [total[1 + column] / total[3 + model] for model in (0, 1) for column in (0, 1)]

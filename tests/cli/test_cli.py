@@ -191,7 +191,7 @@ def test_interruption_is_status_130(scene, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "error, said", [(ZeroDivisionError("0"), "defect of porefv"), (MemoryError(), "not enough memory")]
+    ("error", "said"), [(ZeroDivisionError("0"), "defect of porefv"), (MemoryError(), "not enough memory")]
 )
 def test_unforeseen_errors_are_status_1_and_no_traceback(scene, capsys, monkeypatch, error, said):
     def fail(*arguments, **options):
@@ -246,7 +246,7 @@ def test_a_stage_shows_its_state_and_which_part_of_it_is_done():
     assert "\x1b[36m00:00" in text  # what remains by the clock
 
 
-@pytest.mark.parametrize("stream, quiet", [(io.StringIO(), False), (Terminal(), True)])
+@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
 def test_log_and_quiet_terminal_show_nothing(stream, quiet):
     progress = Progress(["reading"], stream, quiet=quiet)
     progress.note("compiling")

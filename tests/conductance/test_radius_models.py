@@ -125,7 +125,7 @@ def test_effective_radius_between_three_touching_equal_spheres():
     assert_allclose(conductivity(mesh, NO_SLIP, 0, 1, 2), expected, rtol=1e-11)
 
 
-@pytest.mark.parametrize("a, b", [(0.2, 0.2), (0.2, 0.35)], ids=["square", "rectangle"])
+@pytest.mark.parametrize(("a", "b"), [(0.2, 0.2), (0.2, 0.35)], ids=["square", "rectangle"])
 def test_effective_radius_between_a_sphere_and_two_walls(a, b):
     r = 0.15
     mesh = PoreMesh(Packing([[a, 0.5, b]], [r], UNIT))

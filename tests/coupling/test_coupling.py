@@ -85,7 +85,7 @@ def test_forces_of_any_pressures_add_up_to_nothing(exchange):
 
 
 def test_the_whole_moving_on_changes_no_pore(exchange):
-    mesh, operator = exchange
+    _mesh, operator = exchange
     velocity = np.array([0.3, -0.2, 0.5])
     rates = operator.rates(np.tile(velocity, (54, 1)), np.tile(velocity, (6, 1)))
     assert_allclose(rates, 0.0, atol=1e-14)

@@ -163,7 +163,7 @@ def test_a_lattice_that_rounding_has_bent_has_the_permeability_of_the_exact_one(
 
 
 @pytest.mark.parametrize(
-    "model, kind, jump",
+    ("model", "kind", "jump"),
     [
         (HydraulicRadius, "sc", 8e-3), (HydraulicRadius, "bcc", 3e-8), (HydraulicRadius, "fcc", 4e-5),
         (HydraulicRadius, "hcp", 2e-5), (SectionFriction, "sc", 7.3e-3), (SectionFriction, "bcc", 2e-7),
@@ -285,7 +285,7 @@ def test_triples_of_spheres_and_walls_are_counted():
     # Three in a row, the outer two within reach of each other, inside the middle one.
     assert Packing([[0.4, 0.5, 0.5], [0.5, 0.5, 0.5], [0.595, 0.5, 0.5]], [r, 0.09, r], UNIT).triple_overlaps == 1
     # A sphere that reaches over an edge of the box, and two whose lens reaches over a wall.
-    assert Packing([[0.08, 0.5, 0.08]], [r], UNIT).triple_overlaps == 0 + (2 * 0.08**2 < r**2)
+    assert Packing([[0.08, 0.5, 0.08]], [r], UNIT).triple_overlaps == 0 + (r**2 > 2 * 0.08**2)
     assert Packing([[0.06, 0.5, 0.06]], [r], UNIT).triple_overlaps == 1
     for z, triples in ((0.06, 0), (0.04, 1)):  # the circle they share has radius 0.05
         assert Packing([[0.5 - h / 2, 0.5, z], [0.5 + h / 2, 0.5, z]], [r, r], UNIT).triple_overlaps == triples

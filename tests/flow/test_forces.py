@@ -200,7 +200,7 @@ def test_spheres_of_a_cubic_lattice_share_the_drop_equally(lattice, unit_flow, a
 def test_forces_in_a_lattice_do_not_show_how_ties_were_cut(lattice, unit_flow):
     # Between the symmetric halves of a square a triangulation must choose; forces are shared over the whole square.
     forces = unit_flow(PoreMesh(lattice("sc", 3)), Walls.along("y")).forces.total.reshape(3, 3, 3, 3)
-    x, y, z = range(3)
+    _x, _y, _z = range(3)
     assert_allclose(forces[::-1], forces * [-1, 1, 1], rtol=0, atol=1e-13)
     assert_allclose(forces[:, :, ::-1], forces * [1, 1, -1], rtol=0, atol=1e-13)
     assert_allclose(forces.transpose(2, 1, 0, 3)[..., [2, 1, 0]], forces, rtol=0, atol=1e-13)

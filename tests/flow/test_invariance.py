@@ -52,7 +52,7 @@ def test_the_answer_does_not_depend_on_where_the_box_stands(reference, name, shi
     check_same(flow_through(packing, model=model), flow_through(moved, model=model))
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 5), ("bcc", 3), ("fcc", 3), ("hcp", 3)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 5), ("bcc", 3), ("fcc", 3), ("hcp", 3)])
 def test_a_lattice_may_stand_anywhere(lattice, kind, m):
     # A thousand boxes away rounding turns its ties and contacts into gaps and overlaps of 1e-13.
     packing = lattice(kind, m)
@@ -98,7 +98,7 @@ def test_the_answer_does_not_depend_on_the_viscosity(reference, viscosity):
     check_same(flow_through(packing), flow_through(packing, viscosity=viscosity), viscosity=viscosity)
 
 
-@pytest.mark.parametrize("scale, drop, viscosity", [(1e-9, 1e9, 1e12), (1e6, 1e-9, 1e-12), (1e-9, 1e-9, 1e12)])
+@pytest.mark.parametrize(("scale", "drop", "viscosity"), [(1e-9, 1e9, 1e12), (1e6, 1e-9, 1e-12), (1e-9, 1e-9, 1e12)])
 def test_extreme_units_together_give_the_same_answer(reference, scale, drop, viscosity):
     packing = reference("n54_s1")
     scaled = Packing(packing.centres * scale, packing.radii * scale, Box([0, 0, 0], [scale] * 3))
@@ -118,7 +118,7 @@ def test_the_answer_does_not_depend_on_the_order_of_the_spheres(reference, name)
     check_same(flow_through(packing), flow_through(shuffled), order=order)
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 5), ("bcc", 4), ("fcc", 3), ("hcp", 5)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 5), ("bcc", 4), ("fcc", 3), ("hcp", 5)])
 def test_the_answer_does_not_depend_on_the_order_of_the_spheres_of_a_lattice(lattice, kind, m):
     packing = lattice(kind, m, spacing=0.1)
     order = np.random.default_rng(2).permutation(len(packing))
@@ -174,7 +174,7 @@ def test_a_random_packing_may_be_turned_in_48_ways(reference, model):
     check_turned(packing, model)
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 4), ("bcc", 3), ("fcc", 2), ("hcp", 3)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 4), ("bcc", 3), ("fcc", 2), ("hcp", 3)])
 @pytest.mark.parametrize("model", MODELS, ids=["hydraulic", "effective", "sections"])
 def test_a_lattice_may_be_turned_in_48_ways(lattice, kind, m, model):
     # Ties are broken in the order of the coordinates, which a turn changes: none of it may show. With spacings

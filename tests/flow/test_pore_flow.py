@@ -201,7 +201,7 @@ def test_mean_velocity_does_not_depend_on_where_the_box_stands(random_packing):
     assert_allclose(total[2], here.inflow * 7.0, rtol=1e-10)
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 4), ("bcc", 3), ("fcc", 2)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 4), ("bcc", 3), ("fcc", 2)])
 def test_velocities_in_a_lattice_are_mirrored_with_it(lattice, unit_flow, kind, m):
     mesh = PoreMesh(lattice(kind, m))
     flow = unit_flow(mesh, Walls.along("y", slip=True))
@@ -312,7 +312,7 @@ def test_flat_and_long_boxes_are_boxes(random_packing, unit_flow, model):
 
 
 @pytest.mark.parametrize(
-    "kind, m, axes", [("sc", 10, (0, 1, 2)), ("bcc", 8, (0, 1, 2)), ("fcc", 7, (0, 1, 2)), ("hcp", 13, (0, 2))]
+    ("kind", "m", "axes"), [("sc", 10, (0, 1, 2)), ("bcc", 8, (0, 1, 2)), ("fcc", 7, (0, 1, 2)), ("hcp", 13, (0, 2))]
 )
 def test_pressures_in_a_lattice_of_a_thousand_spheres_are_mirrored_with_it(lattice, unit_flow, kind, m, axes):
     from scipy.spatial import KDTree

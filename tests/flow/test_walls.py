@@ -34,7 +34,7 @@ def test_walls_stand_in_the_order_of_their_names():
 
 
 @pytest.mark.parametrize(
-    "pressures, axis",
+    ("pressures", "axis"),
     [
         ({"x_min": 1, "x_max": 0}, 0),
         ({"z_min": 1, "z_max": 1}, 2),
@@ -61,7 +61,7 @@ def test_no_mapping_means_plain_walls():
 
 
 @pytest.mark.parametrize(
-    "mapping, said",
+    ("mapping", "said"),
     [
         ({"top": {"pressure": 1.0}}, "unknown wall 'top'.*x_min"),
         ({"y_min": 1.0}, "wall y_min: expected a table"),

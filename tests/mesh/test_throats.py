@@ -72,7 +72,7 @@ def test_sums_are_exact_for_a_large_polydisperse_packing(random_packing):
     assert_allclose(walls, 1.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 4), ("bcc", 3), ("fcc", 3), ("hcp", 5)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 4), ("bcc", 3), ("fcc", 3), ("hcp", 5)])
 @pytest.mark.parametrize("radius", [1.0, 0.6], ids=["touching", "loose"])
 def test_sums_are_exact_for_lattices(lattice, kind, m, radius):
     mesh = PoreMesh(lattice(kind, m, radius, spacing=0.3))
@@ -261,7 +261,7 @@ def test_circle_between_three_spheres_touches_them(radii, gap):
     a, b, c = np.array(radii) + gap  # pairwise distances r_i + r_j + 2 gap
     ab, ac, bc = a + b, a + c, b + c
     x = (ab**2 + ac**2 - bc**2) / (2 * ab)
-    corners = np.array([[0, 0, 0], [ab, 0, 0], [x, np.sqrt(ac**2 - x**2), 0]]) + [0.35, 0.35, 0.5]
+    corners = [*np.array([[0, 0, 0], [ab, 0, 0], [x, np.sqrt(ac**2 - x**2), 0]]), 0.35, 0.35, 0.5]
     mesh = PoreMesh(Packing(corners, radii, Box([0, 0, 0], [1, 1, 1])))
     t = facet_throat(mesh, 0, 1, 2)
     rho = mesh.throats.inscribed_radii(NO_SLIP)[t]

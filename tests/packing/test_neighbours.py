@@ -101,7 +101,7 @@ def test_radii_in_another_unit_than_centres_are_an_error_not_an_exhausted_memory
 
 
 @pytest.mark.parametrize(
-    "centres, radii, gap",
+    ("centres", "radii", "gap"),
     [
         (np.zeros((2, 2)), np.ones(2), 0.0),
         (np.zeros((2, 3)), np.ones(3), 0.0),

@@ -43,7 +43,7 @@ def test_box_knows_its_size_volume_and_sections():
 
 
 @pytest.mark.parametrize(
-    "lower, upper, said",
+    ("lower", "upper", "said"),
     [
         ([0, 0, 0], [1, 0, 1], "size 0 m along y"),
         ([0, 0, 0], [1, 1, -1], "size -1 m along z"),
@@ -96,7 +96,7 @@ def test_packing_survives_pickling():
 
 
 @pytest.mark.parametrize(
-    "centres, radii, said",
+    ("centres", "radii", "said"),
     [
         (np.zeros((2, 2)), [1, 1], "shape"),
         (np.zeros((2, 3)), [1], "shape"),
@@ -194,7 +194,7 @@ def test_solid_volume_agrees_with_counting_random_points():
 
 
 @pytest.mark.parametrize(
-    "name, porosity",
+    ("name", "porosity"),
     [
         ("n25_s1", 0.533554371),
         ("n54_s1", 0.490331494),
@@ -257,7 +257,7 @@ def test_one_sphere_and_spheres_on_a_line_or_in_a_plane_are_legitimate(refused):
     line = np.array([[0.125, 0.5, 0.5], [0.375, 0.5, 0.5], [0.625, 0.5, 0.5]])
     assert refused(line[:1], [0.1]) is None
     assert refused(line, [0.1] * 3) is None
-    assert refused(np.concatenate((line, line + [0, 0.25, 0])), [0.1] * 6) is None
+    assert refused(np.concatenate((line, [*line, 0, 0.25, 0])), [0.1] * 6) is None
 
 
 def test_moderate_overlap_is_legitimate(refused):
@@ -280,7 +280,7 @@ def test_a_centre_inside_another_sphere_is_refused(refused):
     assert "the centre of sphere 1 lies in sphere 0" in error
 
 
-@pytest.mark.parametrize("wall, axis, value", [("x_min", 0, -0.25), ("y_max", 1, 1.25), ("z_max", 2, 1.0)])
+@pytest.mark.parametrize(("wall", "axis", "value"), [("x_min", 0, -0.25), ("y_max", 1, 1.25), ("z_max", 2, 1.0)])
 def test_a_centre_beyond_or_on_a_wall_is_refused(refused, wall, axis, value):
     centres = np.full((2, 3), 0.5)
     centres[1, axis] = value

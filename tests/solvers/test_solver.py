@@ -206,7 +206,7 @@ def test_networks_cut_into_parts_are_solved_as_any_other(order):
 
 
 def test_preconditioner_is_symmetric_and_positive():
-    network, rhs = grid_network(10, 8)
+    network, _rhs = grid_network(10, 8)
     m = ApproximateCholesky.of(network)
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -288,7 +288,7 @@ def test_a_solver_that_does_not_converge_says_so(monkeypatch):
 @pytest.mark.parametrize("solver", METHODS)
 def test_a_looser_tolerance_is_kept_too(solver):
     network, rhs = grid_network(10, 3)
-    x, report = solve(network, rhs, solver, tolerance=1e-4)
+    _x, report = solve(network, rhs, solver, tolerance=1e-4)
     assert report.imbalance <= 1e-4 and report.tolerance == 1e-4
     if solver == "cg":
         assert report.iterations < solve(network, rhs, solver)[1].iterations

@@ -112,9 +112,11 @@ def test_other_files_are_never_replaced(tmp_path, force):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(InputError, match="not results of porefv"), atomic_directory(tmp_path, force=force):
         pass
-    with pytest.raises(InputError, match="a file of that name"):
-        with atomic_directory(tmp_path / "thesis.tex", force=force):
-            pass
+    with (
+        pytest.raises(InputError, match="a file of that name"),
+        atomic_directory(tmp_path / "thesis.tex", force=force),
+    ):
+        pass
     assert content(tmp_path) == {"thesis.tex": "years of work"}
 
 

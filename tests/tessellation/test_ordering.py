@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ def test_rounds_hold_every_sphere_once_and_double_in_size(n):
     parts = rounds(n)
     np.testing.assert_array_equal(np.concatenate([np.arange(n)[part] for part in parts]), np.arange(n))
     ends = [part.stop for part in parts]
-    assert all(b in (2 * a, 2 * a + 1) for a, b in zip(ends, ends[1:], strict=False))
+    assert all(b in (2 * a, 2 * a + 1) for a, b in itertools.pairwise(ends))
     assert ends[0] <= 1000
 
 

@@ -227,7 +227,7 @@ def test_small_reference_packings_satisfy_the_definition(reference, name):
 
 
 @pytest.mark.parametrize(
-    "name, pores",
+    ("name", "pores"),
     [("n25_s1", 122), ("n54_s1", 272), ("n200_s1", 1088), ("n2000_s1", 11_299), ("n20000_s1", 117_562)],
 )
 def test_there_are_as_many_cells_as_yade_finds(mesh_of, values, name, pores):
@@ -383,7 +383,7 @@ def test_random_points_of_random_weights_have_the_cells_of_qhull():
 # ---- lattices ----------
 
 
-@pytest.mark.parametrize("kind, m", [("sc", 10), ("bcc", 8), ("fcc", 7), ("hcp", 13)])
+@pytest.mark.parametrize(("kind", "m"), [("sc", 10), ("bcc", 8), ("fcc", 7), ("hcp", 13)])
 @pytest.mark.parametrize("spacing", [1.0, 0.1], ids=["exact", "rounded"])
 def test_lattices_triangulate_and_fill_the_box(lattice, kind, m, spacing):
     # A spacing of 0.1 rounds every coordinate: ties become near-ties of either sign, and ties of ties.

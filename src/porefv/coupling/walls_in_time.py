@@ -28,6 +28,7 @@ class ConstantPressure:
     pressure: float
 
     def at(self, time: float) -> float:
+        """The pressure [Pa] at a time since the history was set [s]."""
         return self.pressure
 
 
@@ -39,6 +40,7 @@ class PressureTable:
     pressures: tuple[float, ...]
 
     def at(self, time: float) -> float:
+        """The pressure [Pa] at a time since the history was set [s]."""
         return float(np.interp(time, self.times, self.pressures))
 
 
@@ -51,6 +53,7 @@ class SinePressure:
     period: float
 
     def at(self, time: float) -> float:
+        """The pressure [Pa] at a time since the history was set [s]."""
         return self.mean + self.amplitude * math.sin(2.0 * math.pi * time / self.period)
 
 

@@ -238,6 +238,7 @@ def ensure_drawing() -> None:
 
 
 def library_loads(library: str) -> bool:
+    """Whether the system finds a shared library."""
     try:
         ctypes.CDLL(library)
     except OSError:

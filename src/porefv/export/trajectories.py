@@ -103,7 +103,6 @@ class Trajectory:
         InputError
             If a file cannot be written.
         """
-
         dem = self.dem
         contacts = dem.contacts
         forces = _resultants(dem, contacts)
@@ -178,7 +177,6 @@ def _polydata(
     points: np.ndarray, data: dict[str, np.ndarray], lines: np.ndarray | None = None, polygons: np.ndarray | None = None
 ) -> vtkPolyData:
     """Points, with lines or polygons that have data; there may be none, and the data then is empty, too."""
-
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(points))
     if lines is not None:

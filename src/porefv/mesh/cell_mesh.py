@@ -89,10 +89,12 @@ class CellMesh:
 
     @property
     def n_spheres(self) -> int:
+        """Number of spheres."""
         return len(self.packing)
 
     @property
     def n_cells(self) -> int:
+        """Number of cells."""
         return len(self.cells)
 
     @cached_property

@@ -220,7 +220,7 @@ class Packing:
         if not wall_tolerance >= 0:
             raise InputError(f"wall_tolerance must be a number >= 0, not {wall_tolerance}.")
         box = self._require_box()
-        if not (SHORTEST <= box.size.min() and box.size.max() <= LONGEST):
+        if not (box.size.min() >= SHORTEST and box.size.max() <= LONGEST):
             raise InputError(
                 f"{self._path()}the box has sides {vector(box.size)} m; they must lie between {SHORTEST:g} and "
                 f"{LONGEST:g} m. Give lengths in another unit."

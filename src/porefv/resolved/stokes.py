@@ -301,7 +301,7 @@ def _wall_portions(on_wall: np.ndarray, axis: int, pressures: np.ndarray, slip: 
     portions = np.zeros(on_wall.shape)
     left = np.ones(on_wall.shape[1], bool)
     closed = np.isnan(pressures)
-    normal = WALL_AXES == axis
+    normal = axis == WALL_AXES
     for bears in (closed & normal, closed & ~normal & ~slip, ~closed & ~normal):
         those = on_wall & bears[:, None] & left
         count = those.sum(axis=0)

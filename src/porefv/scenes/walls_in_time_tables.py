@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ from porefv.scenes.values import Numbers, Seconds, key
 
 def increase_from_zero(times: Sequence[float]) -> bool:
     """Whether times are increasing, and none before 0."""
-    return len(times) > 0 and times[0] >= 0.0 and all(a < b for a, b in zip(times, times[1:], strict=False))
+    return len(times) > 0 and times[0] >= 0.0 and all(a < b for a, b in itertools.pairwise(times))
 
 
 def _pressure(value: float) -> float:

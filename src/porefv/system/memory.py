@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from porefv.errors import ComputationError
@@ -39,10 +40,8 @@ def _machine(root: Path) -> Iterator[int]:
                 return
     except (OSError, ValueError):
         pass
-    try:
+    with suppress(AttributeError, ValueError, OSError):  # not POSIX
         yield os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        pass
 
 
 def _control_groups(root: Path) -> Iterator[int]:

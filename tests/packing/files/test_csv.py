@@ -82,7 +82,7 @@ def test_box_from_comments(read):
 
 
 @pytest.mark.parametrize(
-    "comments, said",
+    ("comments", "said"),
     [
         ("# box_lower = 0 0 0\n", "'# box_upper = x y z' is missing"),
         ("# box_lower = 0 0 0\n# box_lower = 0 0 0\n", ", line 2: box_lower is given twice"),
@@ -97,7 +97,7 @@ def test_a_bad_box_is_refused(error, comments, said):
 
 
 @pytest.mark.parametrize(
-    "content, said",
+    ("content", "said"),
     [
         ("a,b,c,d\n1,2,3,4\n", ", line 1: the header 'a,b,c,d' lacks x, y, z, radius"),
         ("# x,y,z,radius\n1,2,3,4\n", ", line 2: the header '1,2,3,4' lacks x, y, z, radius"),
@@ -112,7 +112,7 @@ def test_a_wrong_header_is_refused(error, content, said):
 
 
 @pytest.mark.parametrize(
-    "row, said",
+    ("row", "said"),
     [
         ("1,2,three,4", "z is 'three', not a number"),
         ("1,2,,4", "the cell of 'z' is empty"),
@@ -135,7 +135,7 @@ def test_a_decimal_comma_is_recognised(error):
 
 
 @pytest.mark.parametrize(
-    "row, said",
+    ("row", "said"),
     [
         ("nan,2,3,4", "values that are not finite"),
         ("1,2,3,inf", "values that are not finite"),

@@ -85,7 +85,7 @@ def test_a_data_file_without_box_or_hint_is_read(read):
 
 
 @pytest.mark.parametrize(
-    "old, new, said",
+    ("old", "new", "said"),
     [
         ("3 atoms", "4 atoms", ", line 19: 4 atoms declared, 3 given"),
         ("3 atoms", "2 atoms", ", line 19: 2 atoms declared, 3 given"),
@@ -116,7 +116,7 @@ def test_of_a_dump_the_last_frame_is_read_by_atom_id(read):
 
 
 @pytest.mark.parametrize(
-    "columns, factor, size, lower",
+    ("columns", "factor", "size", "lower"),
     [
         ("id type xu yu zu radius", 1, 1, 0),
         ("id type xs ys zs radius", 1, [2, 2, 4], [-1, 0, 0]),
@@ -137,7 +137,7 @@ def test_a_dump_is_known_by_its_content_and_may_hold_units_and_time(read):
 
 
 @pytest.mark.parametrize(
-    "content, said",
+    ("content", "said"),
     [
         (frame(0, 0.1)[:-24], ", line 10: 2 atoms declared, 1 given. Was the file cut off?"),
         (frame(0, 0.1) + frame(1, 0.1)[:41], ": the last frame lacks ITEM: BOX BOUNDS"),

@@ -32,7 +32,7 @@ def test_points_radii_and_box_are_read(tmp_path, points, extension, binary):
     np.testing.assert_array_equal(packing.box.upper, [1, 2, 3])
 
 
-@pytest.mark.parametrize("name, factor", [("radii", 1), ("Radius", 1), ("r", 1), ("Diameter", 0.5)])
+@pytest.mark.parametrize(("name", "factor"), [("radii", 1), ("Radius", 1), ("r", 1), ("Diameter", 0.5)])
 def test_names_of_radii_and_diameters(tmp_path, name, factor):
     mesh = pyvista.PolyData(CENTRES.astype(np.float32))
     mesh.point_data[name] = np.array([0.5, 1], dtype=np.float32)

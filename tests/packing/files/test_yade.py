@@ -47,7 +47,7 @@ def test_what_is_written_is_what_yade_reads(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content, said",
+    ("content", "said"),
     [
         ("1 2 3 4\n5 6 seven 8\n", "line 2: z is 'seven', not a number"),
         ("1 2 3 4\n\n5 6 7\n", "line 3: 3 cells instead of 4"),

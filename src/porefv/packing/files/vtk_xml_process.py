@@ -19,6 +19,7 @@ _LIBRARIES, _PER_BYTE = 2**32, 100
 
 
 def main(path: str) -> int:
+    """Read a file and write its arrays; 0, or 1 if it cannot be read."""
     limit_memory(_LIBRARIES + _PER_BYTE * os.path.getsize(path))
     window = vtkFileOutputWindow()  # VTK says nothing by itself
     window.SetFileName(os.devnull)
