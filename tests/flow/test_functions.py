@@ -16,6 +16,7 @@ from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import solve_pressure
 from porefv.flow.solid_pressure import acting_pressure
 from porefv.flow.walls import Wall, Walls
+from porefv.mesh.cell_mesh import CellMesh
 
 
 @pytest.mark.parametrize("model", MODELS.values())
@@ -159,3 +160,44 @@ def test_arguments_of_another_kind_are_refused(mesh_of, arguments, said):
 def test_a_number_is_no_wall():
     with pytest.raises(InputError, match=r"y_min must be a Wall, such as Wall\(pressure=1.0\), not 1.0"):
         Walls(y_min=1.0)
+
+
+def test_slips_of_another_number_of_walls_and_meshes_without_pores_are_refused(mesh_of):
+    mesh = mesh_of("n25_s1")
+    for slip in ([True], [False] * 5, []):
+        with pytest.raises(InputError, match=r"slip must have one value per wall, \(6,\)"):
+            throat_conductances(mesh, HydraulicRadius(), slip, 1e-3)
+    numbers = throat_conductances(mesh, HydraulicRadius(), [1, 0, 0, 0, 0, 0], 1e-3)
+    assert_array_equal(
+        numbers, throat_conductances(mesh, HydraulicRadius(), [True, False, False, False, False, False], 1e-3)
+    )
+    with pytest.raises(InputError, match=r"not CellMesh: write PoreMesh\(packing\)"):
+        throat_conductances(CellMesh(mesh.packing), HydraulicRadius(), [False] * 6, 1e-3)
+
+
+def test_given_pressures_are_compared_with_the_range_of_those_imposed(mesh_of):
+    # A small drop on a large pressure: one value for all pores is no solution.
+    mesh, high = mesh_of("n25_s1"), 101325.0
+    walls = Walls(y_min=Wall(pressure=high + 0.05), y_max=Wall(pressure=high))
+    with pytest.raises(InputError, match="on walls of imposed pressure have another pressure"):
+        PoreFlow.from_pressure(mesh, np.full(mesh.n_pores, high), walls)
+
+
+class Clogged(HydraulicRadius):
+    """Half of the throats are closed, so that there are isolated pores."""
+
+    name = "clogged"
+
+    def conductivity(self, throats, slip):
+        found = super().conductivity(throats, slip)
+        return np.where(found > np.quantile(found, 0.5), found, 0.0)
+
+
+def test_nothing_flows_between_isolated_pores(mesh_of):
+    mesh, walls = mesh_of("n54_s1"), Walls.along("y")
+    flow = PoreFlow(mesh, walls, conductance=Clogged())
+    among = flow.solution.isolated[mesh.throats.pores].all(axis=1)
+    assert (flow.conductances[among] > 0.0).any() and not flow.flux[among].any()
+    given = PoreFlow.from_pressure(mesh, flow.pressure, walls, conductance=Clogged())
+    assert given.solver_report.imbalance < 1e-9
+    assert_allclose(given.permeability, flow.permeability, rtol=1e-9)

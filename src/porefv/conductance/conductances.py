@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.errors import InputError, counted
 from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALLS
 from porefv.system.number_checks import check_number, ensure_finite
 
 
@@ -35,7 +36,10 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
     ComputationError
         If a conductance is not a finite number.
     """
+    ensure_pore_mesh(mesh)
     throats, slip = mesh.throats, np.asarray(slip, bool)
+    if slip.shape != (len(WALLS),):
+        raise InputError(f"slip must have one value per wall, (6,), not shape {slip.shape}")
     check_number(viscosity, "viscosity", "a positive number of Pa s", lambda x: x > 0.0)
     conductivity = np.asarray(ensure_model(model).conductivity(throats, slip), float)
     if conductivity.shape != (len(throats),):
@@ -50,8 +54,16 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
     return ensure_finite(conductances, f"conductances of {model.name}")
 
 
+def ensure_pore_mesh(mesh: PoreMesh) -> None:
+    """InputError if a mesh has no pores and throats."""
+    if not isinstance(mesh, PoreMesh):
+        given = type(mesh).__name__
+        raise InputError(f"mesh must be a PoreMesh, not {given}: write PoreMesh(packing)")
+
+
 def check_conductances(mesh: PoreMesh, conductances: ArrayLike) -> np.ndarray:
     """(t,) float array of conductances; InputError if the shape is another, or a value is negative or not finite."""
+    ensure_pore_mesh(mesh)
     found = np.asarray(conductances, float)
     if found.shape != (len(mesh.throats),):
         raise InputError(

@@ -24,7 +24,7 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, pressure: PressureField | n
     Returns
     -------
     (t,) array
-        Flux from the first pore of each throat to its second [m³/s].
+        Flux from the first pore of each throat to its second; zero between isolated pores [m³/s].
 
     Raises
     ------
@@ -33,8 +33,11 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, pressure: PressureField | n
     ComputationError
         If a flux is not a finite number.
     """
-    drops = as_field(mesh, pressure).drops(mesh.throats.pores)
-    return ensure_finite(check_conductances(mesh, conductances) * drops, "fluxes")
+    conductances = check_conductances(mesh, conductances)
+    field, pairs = as_field(mesh, pressure), mesh.throats.pores
+    found = conductances * field.drops(pairs)
+    found[field.isolated[pairs].all(axis=1)] = 0.0
+    return ensure_finite(found, "fluxes")
 
 
 def net_outflows(mesh: PoreMesh, flux: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES
 from porefv.system.kernels import njit
+from porefv.system.number_checks import three_numbers
 
 # Throats whose forces are in memory at a time.
 BLOCK = 1 << 16
@@ -145,7 +146,7 @@ def grain_forces(
     thrust += -(WALL_NORMALS * walls.held[:, None]).sum(axis=0) * reference * sections
 
     volumes = 4.0 / 3.0 * np.pi * mesh.packing.radii**3
-    weight = np.zeros(3) if weight is None else np.asarray(weight, float)
+    weight = np.zeros(3) if weight is None else three_numbers(weight, "weight", "N/m³")
     spread = float(np.ptp(relative)) or float(np.abs(field.pressure).max()) or 1.0
     return Forces(
         pressure=on_spheres_p[:n],

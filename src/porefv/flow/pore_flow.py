@@ -36,7 +36,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
 from porefv.solvers.solver import TOLERANCE, SolverReport
-from porefv.system.number_checks import MOST, ensure_finite
+from porefv.system.number_checks import MOST, ensure_finite, three_numbers
 from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
@@ -92,12 +92,10 @@ class PoreFlow:
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()
         self.conductance = ensure_model(conductance) if conductance is not None else AUTO()
-        self.gravity = np.asarray(gravity, float)
+        self.gravity = three_numbers(gravity, "gravity", "m/s²")
         self.solver = solver
         self.tolerance = tolerance
         self.timings: dict[str, float] = {}
-        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
-            raise InputError(f"gravity must be three finite numbers in m/s², not {gravity!r}")
         if np.abs(self.gravity).max() > MOST:
             raise InputError(f"gravity must be at most {MOST:g} m/s² along each axis, not {gravity!r}")
         self._reference = reference_pressure(walls)

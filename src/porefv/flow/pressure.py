@@ -15,7 +15,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.pressure_equation import reached, solve_network
 from porefv.solvers.solver import TOLERANCE, SolverReport
 
-# How far a given pressure may be from the imposed one of its pore, relative to the range of the pressures.
+# How far a given pressure may be from the imposed one of its pore, relative to the range of the imposed pressures.
 GIVEN_TOLERANCE = 1e-6
 # Imbalance of a given pressure, relative to the flow, up to which no warning is given.
 BALANCED = 1e-3
@@ -143,7 +143,8 @@ def solve_pressure(
     walls : Walls
         At least one must have a pressure.
     sources : (n_pores,) array, optional
-        Volume injected into each pore per unit time [m³/s].
+        Volume injected into each pore per unit time. What is injected into a pore on a wall of imposed pressure leaves
+        through the wall, and changes no pressure [m³/s].
     solver, tolerance
         See `porefv.solvers.Solver`.
 
@@ -198,7 +199,8 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     reference = reference_pressure(walls)
     imposed = held_pressures(mesh, walls.pressures)
     free = np.isnan(imposed)
-    span = float(np.ptp(pressure)) or abs(reference) or 1.0
+    known = imposed[~free]
+    span = float(np.ptp(known)) or float(np.ptp(pressure)) or abs(reference) or 1.0
     wrong = np.flatnonzero(np.abs(pressure - imposed) > GIVEN_TOLERANCE * span)  # false for free pores, which have NaN
     if len(wrong):
         raise InputError(
@@ -209,10 +211,11 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     relative = pressure - reference
     pairs = mesh.throats.pores
     i, j = pairs.T
-    flux = conductances * (relative[i] - relative[j])
+    isolated = ~reached(pairs, conductances, ~free)
+    flux = np.where(isolated[i] & isolated[j], 0.0, conductances * (relative[i] - relative[j]))
     outflow = np.bincount(i, flux, mesh.n_pores) - np.bincount(j, flux, mesh.n_pores)
     lost, through = float(np.abs(outflow[free]).sum()), 0.5 * float(np.abs(outflow[~free]).sum())
-    imbalance = lost / through if through > 0.0 else lost
+    imbalance = lost / (through or float(np.abs(flux).sum()) or 1.0)
     if imbalance > BALANCED:
         warnings.warn(
             f"the given pressure leaves {imbalance:.1e} of the flow out of balance: was it found with other "
@@ -221,4 +224,4 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
             stacklevel=3,
         )
     report = SolverReport("given", int(np.count_nonzero(free)), 0, 0.0, imbalance, 0.0, 0.0)
-    return PressureField(reference, relative, np.zeros(mesh.n_pores), ~reached(pairs, conductances, ~free), report)
+    return PressureField(reference, relative, np.zeros(mesh.n_pores), isolated, report)
