@@ -37,7 +37,7 @@ class HydraulicRadius(ConductanceModel):
 
 
 @njit(cache=True, parallel=True)
-def _hydraulic_radius(alpha, areas, volumes, surfaces):
+def _hydraulic_radius(alpha: float, areas: np.ndarray, volumes: np.ndarray, surfaces: np.ndarray) -> np.ndarray:
     """α A^f (φ / Σγ)², zero where φ or Σγ is not positive."""
     conductivity = np.zeros_like(areas)
     for t in prange(areas.shape[0]):

@@ -122,7 +122,7 @@ def _add_spheres(pv: Any, plotter: Any, spheres: Any, view: _View, opened: bool)
     resolution = int(np.clip(np.sqrt(_TRIANGLES / len(radii) / 2), 8, 60))
     ball = pv.Sphere(radius=1.0, theta_resolution=resolution, phi_resolution=resolution)
 
-    def balls(chosen):
+    def balls(chosen: np.ndarray) -> Any:
         centres = pv.PolyData(points[chosen])
         centres["radius"], centres["force"] = radii[chosen], values[chosen]
         return centres.glyph(scale="radius", geom=ball, orient=False)

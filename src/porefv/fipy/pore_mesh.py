@@ -93,16 +93,16 @@ class FipyPoreMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
 
     # The geometry FiPy would derive from its vertices, taken from the pore mesh instead.
 
-    def _calcFaceAreas(self):
+    def _calcFaceAreas(self) -> np.ndarray:
         return self._given_areas
 
-    def _calcFaceCenters(self):
+    def _calcFaceCenters(self) -> np.ndarray:
         return self._given_centres
 
-    def _calcFaceNormals(self):
+    def _calcFaceNormals(self) -> np.ndarray:
         return self._given_normals
 
-    def _calcCellDistAndVec(self):
+    def _calcCellDistAndVec(self) -> tuple[np.ndarray, np.ndarray]:
         distances, vectors = super()._calcCellDistAndVec()
         distances = np.array(distances)
         distances[: len(self._given_distances)] = self._given_distances

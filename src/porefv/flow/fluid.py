@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from porefv.errors import InputError
-from porefv.system.number_checks import LEAST, MOST, within_range
+from porefv.system.number_checks import LEAST, MOST, is_finite_number, within_range
 
 
 @dataclass(frozen=True)
@@ -25,11 +24,11 @@ class Fluid:
     density: float = 1000.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.viscosity) and self.viscosity > 0.0):
+        if not (is_finite_number(self.viscosity) and self.viscosity > 0.0):
             raise InputError(f"viscosity must be a positive number of Pa s, not {self.viscosity!r}")
         if not within_range(self.viscosity):
             raise InputError(f"viscosity must lie between {LEAST:g} and {MOST:g} Pa s, not {self.viscosity!r}")
-        if not (math.isfinite(self.density) and self.density >= 0.0):
+        if not (is_finite_number(self.density) and self.density >= 0.0):
             raise InputError(f"density must be a number of kg/m³, zero or more, not {self.density!r}")
         if self.density > MOST:
             raise InputError(f"density must be at most {MOST:g} kg/m³, not {self.density!r}")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.packing.box import WALLS
-from porefv.system.number_checks import LEAST, MOST, within_range
+from porefv.system.number_checks import LEAST, MOST, is_finite_number, within_range
 
 
 @dataclass(frozen=True)
@@ -31,10 +30,8 @@ class Wall:
 
     def __post_init__(self) -> None:
         if self.pressure is not None:
-            if isinstance(self.pressure, bool) or not isinstance(self.pressure, (int, float, np.number)):
-                raise InputError(f"a wall's pressure must be a number in pascals, not {self.pressure!r}")
-            if not math.isfinite(self.pressure):
-                raise InputError(f"a wall's pressure must be finite, not {self.pressure!r}")
+            if not is_finite_number(self.pressure):
+                raise InputError(f"a wall's pressure must be a number in pascals, and finite, not {self.pressure!r}")
             if self.pressure != 0.0 and not within_range(abs(self.pressure)):
                 raise InputError(
                     f"a wall's pressure must be 0 or of size {LEAST:g} to {MOST:g} Pa, not {self.pressure!r}"
@@ -102,7 +99,7 @@ class Walls:
         lateral = conditions.pop("lateral", Wall())
         return cls(**{name: conditions.get(name, lateral) for name in WALLS})
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Wall]:
         return (getattr(self, name) for name in WALLS)
 
     @property

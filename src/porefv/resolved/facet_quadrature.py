@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -96,7 +97,12 @@ def _nearer(
     return np.array(kept).reshape(-1, 2)
 
 
-def _polar(region: np.ndarray, radius: float, angle_rule, radius_rule):
+def _polar(
+    region: np.ndarray,
+    radius: float,
+    angle_rule: tuple[np.ndarray, np.ndarray],
+    radius_rule: tuple[np.ndarray, np.ndarray],
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Points and weights on the part of a convex polygon beyond a circle about the origin, one of its corners."""
     for k in range(len(region)):
         x, y = region[k - 1], region[k]

@@ -13,7 +13,7 @@ r is the radius of the smaller sphere. What they do to the flow fades as δ^1.5 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -120,13 +120,13 @@ def fluid_body(
     return geometry
 
 
-def _half_space(point: np.ndarray, normal: np.ndarray):
+def _half_space(point: np.ndarray, normal: np.ndarray) -> Any:
     from netgen.csg import Plane, Pnt, Vec
 
     return Plane(Pnt(*point), Vec(*normal))
 
 
-def _box(lower: np.ndarray, upper: np.ndarray):
+def _box(lower: np.ndarray, upper: np.ndarray) -> Any:
     body = None
     for wall in range(6):
         side = _half_space(upper if WALL_SENSES[wall] > 0.0 else lower, WALL_NORMALS[wall]).bc(f"wall{wall}")
@@ -134,7 +134,7 @@ def _box(lower: np.ndarray, upper: np.ndarray):
     return body
 
 
-def _bridge(contact: Contact, centres: np.ndarray, n: int, delta: float):
+def _bridge(contact: Contact, centres: np.ndarray, n: int, delta: float) -> Any:
     from netgen.csg import Cylinder, Pnt
 
     begin = centres[contact.sphere]

@@ -221,7 +221,10 @@ def _ensure_memory(elements: int, unknowns: int, progress: Progress) -> None:
     progress.note(stated)
 
 
-def _read_off(domain, order, space, field, reactions, load, pressures, slip) -> StokesField:
+def _read_off(
+    domain: FluidMesh, order: int, space: Any, field: Any, reactions: Any, load: np.ndarray, pressures: np.ndarray,
+    slip: np.ndarray,
+) -> StokesField:  # fmt: skip
     """Fluxes and forces of a solution; `reactions` is the force of the fluid on what holds its velocities."""
     import ngsolve as ngs
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from porefv.system.kernels import njit
 
 
 @njit(cache=True)
-def join(parent, i, j):
+def join(parent: np.ndarray, i: int, j: int) -> None:
     """Put i and j in one set, under the smaller of their roots; the paths passed are halved."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
