@@ -23,6 +23,7 @@ from porefv.errors import ComputationError
 from porefv.solvers.network import Network
 from porefv.system.growing_arrays import doubled
 from porefv.system.kernels import njit, prange
+from porefv.system.random_numbers import random_state, uniform
 
 _GROUND = -1
 # One end of a link, as its node's list holds it. One record, so that following a list misses the cache once a link.
@@ -216,18 +217,17 @@ def _eliminated(starts, columns, links, leaks, n):
     # Each elimination frees about as many half-links as it makes, so the initial room nearly suffices.
     room = len(columns) + 64
     half_links = np.empty(room, _HALF_LINK)
-    return eliminate(
-        starts, columns, links, leaks, n, half_links, np.empty(2 * room, np.int32), np.empty(2 * room, np.float32)
-    )
+    rows, factors = np.empty(2 * room, np.int32), np.empty(2 * room, np.float32)
+    return eliminate(starts, columns, links, leaks, n, half_links, rows, factors, random_state(0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
+def eliminate(starts, columns, links, leaks, n, half_links, rows, factors, random):
     """Eliminate the first n nodes, the least connected first, in sweeps along the numbering.
 
     Links live in lists of half-links, one list for each of these nodes; a half-link whose other end is gone is
     dropped when met. Nodes from n on are kept: fill between two of them is given back. Arrays of half-links, rows and
-    factors are given, to be filled.
+    factors are given, to be filled, and the state of the random numbers (`system.random_numbers`).
 
     Returns
     -------
@@ -236,7 +236,6 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
     kept (m, 2), strengths (m,) : links between kept nodes that elimination has left
     ground : leaks of the kept nodes
     """
-    np.random.seed(0)
     n_all = leaks.shape[0]
     head = np.full(n, -1, np.int32)
     degree = np.zeros(n, np.int32)
@@ -336,7 +335,7 @@ def eliminate(starts, columns, links, leaks, n, half_links, rows, factors):
             for q in range(m - 2, -1, -1):
                 rest[q] = rest[q + 1] + w[q + 1]
             for q in range(m - 1):
-                aim = np.random.random() * rest[q]
+                aim = uniform(random) * rest[q]
                 p = q + 1
                 passed = w[p]
                 while passed < aim and p < m - 1:
