@@ -202,7 +202,10 @@ def _star(limit):
     return Star(np.empty(limit + 1, np.int32), np.empty(limit + 1), np.empty(limit + 1))
 
 
-@njit(cache=True, nogil=True)
+# The steps for one node are inlined: numba would count references to all the arrays at every call, which takes longer.
+
+
+@njit(cache=True, nogil=True, inline="always")
 def _take_list(i, half_links, gone, slots, star):
     """Gather the neighbours of node i that are left, parallel links added up, and free its list; returns their number.
 
@@ -234,7 +237,7 @@ def _take_list(i, half_links, gone, slots, star):
     return m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _sample_fill(star, m, pivot, half_links, leaks, kept, random):
     """Link each of m neighbours, the weakest first, to one of those with larger weights.
 
@@ -256,7 +259,7 @@ def _sample_fill(star, m, pivot, half_links, leaks, kept, random):
         _add_link(nodes[q], nodes[p], weights[q] * beyond[q] / pivot, half_links, leaks, kept)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _sort_by_weight(star, m):
     """Sort the m neighbours of a star, the smallest weight first, by insertion."""
     nodes, weights, _ = star
@@ -272,7 +275,7 @@ def _sort_by_weight(star, m):
         nodes[p] = node
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _add_link(a, b, weight, half_links, leaks, kept):
     """Add a link between two nodes, or a node and the ground."""
     n = half_links.heads.shape[0]
@@ -293,7 +296,7 @@ def _add_link(a, b, weight, half_links, leaks, kept):
             _add_half_link(b, a, weight, half_links)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _add_half_link(i, other, weight, half_links):
     """Put a half-link to another node at the head of the list of node i."""
     records, heads, degrees, counts = half_links
