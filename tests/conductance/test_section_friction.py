@@ -16,7 +16,7 @@ from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces, grain_forces
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.pressure_along_throats import apply_pressure_along_throats
+from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
 from porefv.flow.solid_pressure import solid_pressure_weights
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
@@ -283,12 +283,11 @@ def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
     # Every facet between three spheres of n25, on triangles of its spheres in 40 000 pieces.
     mesh = mesh_of("n25_s1")
     throats, pressure = mesh.throats, np.zeros((len(mesh.facets.cells), 3, 3))
-    facets, starts = throats.facets_of_throats
-    found = np.zeros((len(facets), 3, 3))
+    facets = throats.facets_of_throats.facets
+    found, drag = np.zeros((2, len(facets), 3, 3))
     apply_pressure_along_throats(
-        np.arange(len(throats)), starts, facets, mesh.facets.cells, mesh.facets.vertices, mesh.n_spheres,
-        mesh.local_points, mesh.sizes, mesh.local_vertices, mesh.facets.normals, throats.doubling_heights,
-        np.ones((len(pressure), 3)), found, np.zeros_like(found),
+        np.arange(len(throats)), throats.facets_of_throats, mesh.facets.planes, mesh.cell_vertices,
+        mesh.local_vertices, ThroatDrops(throats.doubling_heights, np.ones((len(pressure), 3))), found, drag,
     )  # fmt: skip
     pressure[facets] = found
     interior = np.flatnonzero((mesh.facets.vertices < mesh.n_spheres).all(axis=1) & (throats.doubling_heights > 0.0))

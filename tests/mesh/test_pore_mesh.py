@@ -8,6 +8,7 @@ from porefv.mesh.cell_kernels import polyhedron_volumes
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.tessellation.vertices import Vertices
 
 SMALL = ["sc8", "nine_0.72", "n25_s1", "n54_s1", "n200_s1"]
 ODD_BOX = Box([-3.0, 0.25, 1e3], [-1.0, 0.5, 1e3 + 7.0])
@@ -215,7 +216,7 @@ def moved(mesh, velocities, speeds, h):
     points, sizes = mesh.local_points.copy(), mesh.sizes.copy()
     points[:n] += h * velocities
     sizes[n:] += h * speeds
-    return polyhedron_volumes(mesh.cells, n, points, sizes)
+    return polyhedron_volumes(mesh.cells, Vertices(n, points, sizes))
 
 
 @pytest.mark.parametrize("name", ["n25_s1", "n200_s1", "sc8"])

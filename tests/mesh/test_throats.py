@@ -261,7 +261,7 @@ def test_circle_between_three_spheres_touches_them(radii, gap):
     a, b, c = np.array(radii) + gap  # pairwise distances r_i + r_j + 2 gap
     ab, ac, bc = a + b, a + c, b + c
     x = (ab**2 + ac**2 - bc**2) / (2 * ab)
-    corners = [*np.array([[0, 0, 0], [ab, 0, 0], [x, np.sqrt(ac**2 - x**2), 0]]), 0.35, 0.35, 0.5]
+    corners = np.array([[0, 0, 0], [ab, 0, 0], [x, np.sqrt(ac**2 - x**2), 0]]) + np.array([0.35, 0.35, 0.5])
     mesh = PoreMesh(Packing(corners, radii, Box([0, 0, 0], [1, 1, 1])))
     t = facet_throat(mesh, 0, 1, 2)
     rho = mesh.throats.inscribed_radii(NO_SLIP)[t]

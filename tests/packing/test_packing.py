@@ -257,7 +257,7 @@ def test_one_sphere_and_spheres_on_a_line_or_in_a_plane_are_legitimate(refused):
     line = np.array([[0.125, 0.5, 0.5], [0.375, 0.5, 0.5], [0.625, 0.5, 0.5]])
     assert refused(line[:1], [0.1]) is None
     assert refused(line, [0.1] * 3) is None
-    assert refused(np.concatenate((line, [*line, 0, 0.25, 0])), [0.1] * 6) is None
+    assert refused(np.concatenate((line, line + np.array([0, 0.25, 0]))), [0.1] * 6) is None
 
 
 def test_moderate_overlap_is_legitimate(refused):

@@ -205,6 +205,29 @@ def test_networks_cut_into_parts_are_solved_as_any_other(order):
     assert_allclose(1.0 - x[pairs[0, 0]], through, rtol=1e-10)
 
 
+@numba.njit
+def numbers_after(seed, count):
+    np.random.seed(seed)
+    return more_numbers(count)
+
+
+@numba.njit
+def more_numbers(count):
+    found = np.empty(count)
+    for i in range(count):
+        found[i] = np.random.random()
+    return found
+
+
+def test_solving_leaves_the_random_numbers_of_the_caller_alone():
+    expected = numbers_after(7, 20)
+    state = np.random.get_state()[1].copy()
+    begin = numbers_after(7, 10)
+    solve(*grid_network(12, 6), "cg")
+    assert_array_equal(np.concatenate([begin, more_numbers(10)]), expected)
+    assert_array_equal(np.random.get_state()[1], state)
+
+
 def test_preconditioner_is_symmetric_and_positive():
     network, _rhs = grid_network(10, 8)
     m = ApproximateCholesky.of(network)

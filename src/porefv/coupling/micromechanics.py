@@ -172,16 +172,17 @@ def _integrals(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: Arr
     ):
         if moves.shape != shape or not np.isfinite(moves).all():
             raise InputError(f"{what}, must be finite numbers of shape {shape}, not {moves.shape}")
-    return _displacement_integrals(mesh.cells, mesh.n_spheres, mesh.local_points, mesh.sizes, Displacements(u, walls))
+    return _displacement_integrals(mesh.cells, mesh.cell_vertices, Displacements(u, walls))
 
 
 @njit(cache=True, parallel=True)
-def _displacement_integrals(cells, n, points, sizes, displacements):
+def _displacement_integrals(cells, vertices, displacements):
     """∮ u ⊗ n dS over each cell: facet by facet, the mean displacement times the area vector.
 
     The facet opposite to a wall has a projection on it, the cell's face there: the same displacement but for the
     component along the wall's normal, which is the wall's.
     """
+    n = vertices.n_spheres
     integrals = np.zeros((cells.shape[0], 3, 3))
     for t in prange(cells.shape[0]):
         for i in range(4):
@@ -190,24 +191,25 @@ def _displacement_integrals(cells, n, points, sizes, displacements):
                 continue
             # A step in the cycle of four is an odd permutation: every other facet is turned for its area to point out.
             a, b, c = spheres_first(a, c, b, n) if i % 2 == 0 else spheres_first(a, b, c, n)
-            area = area_vector(a, b, c, n, points, sizes)
-            mean = _mean_displacement(a, b, c, n, points, sizes, displacements)
+            area = area_vector(a, b, c, vertices)
+            mean = _mean_displacement(a, b, c, vertices, displacements)
             for p in range(3):
                 for q in range(3):
                     integrals[t, p, q] += mean[p] * area[q]
             wall = cells[t, i] - n
             if wall >= 0:
                 axis = WALL_AXES[wall]
-                mean[axis] = points[n + wall, axis] * displacements.walls[wall]
+                mean[axis] = vertices.points[n + wall, axis] * displacements.walls[wall]
                 for p in range(3):
                     integrals[t, p, axis] -= mean[p] * area[axis]
     return integrals
 
 
 @njit(cache=True)
-def _mean_displacement(a, b, c, n, points, sizes, displacements):
+def _mean_displacement(a, b, c, vertices, displacements):
     """Mean displacement over a facet: linear on a triangle, bilinear between the corners of the others."""
     moves, wall_moves = displacements
+    n = vertices.n_spheres
     mean = np.empty(3)
     for axis in range(3):
         mean[axis] = moves[a, axis]
@@ -215,20 +217,20 @@ def _mean_displacement(a, b, c, n, points, sizes, displacements):
         for axis in range(3):
             mean[axis] = (moves[a, axis] + moves[b, axis] + moves[c, axis]) / 3.0
     elif b < n:  # a trapezoid over the edge ab: half the weight of each end is on the wall
-        ha = wall_distance(a, c, points, sizes)
-        hb = wall_distance(b, c, points, sizes)
+        ha = wall_distance(a, c, vertices)
+        hb = wall_distance(b, c, vertices)
         share = (ha + 2.0 * hb) / (3.0 * (ha + hb))
         for axis in range(3):
             mean[axis] += share * (moves[b, axis] - moves[a, axis])
-        _halve_with_wall(c - n, n, points, wall_moves, mean)
+        _halve_with_wall(c - n, vertices, wall_moves, mean)
     else:
-        _halve_with_wall(b - n, n, points, wall_moves, mean)
-        _halve_with_wall(c - n, n, points, wall_moves, mean)
+        _halve_with_wall(b - n, vertices, wall_moves, mean)
+        _halve_with_wall(c - n, vertices, wall_moves, mean)
     return mean
 
 
 @njit(cache=True)
-def _halve_with_wall(wall, n, points, wall_moves, mean):
+def _halve_with_wall(wall, vertices, wall_moves, mean):
     """Half of the facet's corners are on the wall: along its normal they move with it."""
     axis = WALL_AXES[wall]
-    mean[axis] = 0.5 * (mean[axis] + points[n + wall, axis] * wall_moves[wall])
+    mean[axis] = 0.5 * (mean[axis] + vertices.points[vertices.n_spheres + wall, axis] * wall_moves[wall])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from porefv.conductance.model import FORCE_SPLITS, ForceSplit
 from porefv.errors import InputError
 from porefv.flow.pressure import PressureField, as_field
-from porefv.flow.pressure_along_throats import apply_pressure_along_throats
+from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
 from porefv.flow.walls import Walls
 from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.pore_mesh import PoreMesh
@@ -127,8 +128,8 @@ def grain_forces(
     on_spheres_v = np.zeros((n + 6, 3))
     cell_pressure = relative[mesh.cell_pore]
     drops = cell_pressure[mesh.facets.cells[:, 0]] - cell_pressure[mesh.facets.cells[:, 1]]
-    for rows, by_pressure, by_drag in _unit_forces(mesh, walls.slip, split):
-        _scatter(mesh.facets.vertices[rows], drops[rows], by_pressure, by_drag, on_spheres_p, on_spheres_v)
+    for rows, forces in _unit_forces(mesh, walls.slip, split):
+        _scatter(mesh.facets.vertices[rows], drops[rows], forces, on_spheres_p, on_spheres_v)
 
     sections = np.array([mesh.box.section(axis) for axis in range(3)])
     faces = mesh.wall_faces
@@ -166,15 +167,26 @@ def facet_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit = "surface"
     `slip` (6,) bool marks the walls that do not drag the fluid; `split` is as of `grain_forces`.
     """
     forces = np.empty((len(mesh.facets.cells), 3, 3))
-    for rows, by_pressure, by_drag in _unit_forces(mesh, slip, split):
-        forces[rows] = by_pressure + by_drag
+    for rows, unit_forces in _unit_forces(mesh, slip, split):
+        forces[rows] = unit_forces.pressure + unit_forces.drag
     return forces
 
 
-def _unit_forces(
-    mesh: PoreMesh, slip: np.ndarray, split: ForceSplit
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Facets (m,), and forces (m, 3, 3) on their vertices for unit drops, by pressure and by drag, in blocks.
+class UnitForces(NamedTuple):
+    """Forces on the vertices of some facets for a unit pressure drop across each, along the axes.
+
+    Attributes
+    ----------
+    pressure, drag : (m, 3, 3) arrays
+        By pressure and by drag [m²].
+    """
+
+    pressure: np.ndarray
+    drag: np.ndarray
+
+
+def _unit_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> Iterator[tuple[np.ndarray, UnitForces]]:
+    """Facets (m,), and the forces on their vertices for unit drops, in blocks.
 
     F^{p,k} = A^k n and F^{v,k} = A^f n γ^k / Σγ. With the split 'drag', the part of the drag that is pressure on the
     spheres along the throat is moved from the second to the first.
@@ -187,7 +199,7 @@ def _unit_forces(
         volumes = throats.total_by_facet(mesh.facets.volumes)
         surfaces = throats.total_by_facet(row_sums(weights))
         roundness = np.append(throats.roundness(slip), 1.0)[throats.facet_throat]  # the last: facets within a pore
-        weights = _sheared(weights, volumes, surfaces, roundness, mesh.facets.vertices, mesh.n_spheres, mesh.sizes)
+        weights = _sheared(weights, volumes, surfaces, roundness, mesh.facets.vertices, mesh.cell_vertices)
     sums = throats.total_by_facet(_positive_sum(weights))
     fractions = _drag_fractions(weights, sums, throats.total_by_facet(np.ones(len(sums))))
     vectors = throats.total_vectors(mesh.facets.fluid_areas[:, None] * mesh.facets.normals)
@@ -196,20 +208,26 @@ def _unit_forces(
     for first in [*range(0, len(throats), BLOCK), -1]:
         block = np.arange(first, min(first + BLOCK, len(throats)))
         rows = facets[starts[block[0]] : starts[block[-1] + 1]] if first >= 0 else within
-        by_pressure = mesh.facets.sectors[rows, :, None] * mesh.facets.normals[rows, None, :]
-        by_drag = fractions[rows, :, None] * vectors[rows, None, :]
+        forces = UnitForces(
+            pressure=mesh.facets.sectors[rows, :, None] * mesh.facets.normals[rows, None, :],
+            drag=fractions[rows, :, None] * vectors[rows, None, :],
+        )
         if split == "drag" and first >= 0:
             apply_pressure_along_throats(
-                block, starts, facets, mesh.facets.cells, mesh.facets.vertices, mesh.n_spheres, mesh.local_points,
-                mesh.sizes, mesh.local_vertices, mesh.facets.normals, throats.doubling_heights, fractions,
-                by_pressure, by_drag,
-            )  # fmt: skip
-        yield rows, by_pressure, by_drag
+                block,
+                throats.facets_of_throats,
+                mesh.facets.planes,
+                mesh.cell_vertices,
+                mesh.local_vertices,
+                ThroatDrops(throats.doubling_heights, fractions),
+                *forces,
+            )
+        yield rows, forces
 
 
 @njit(cache=True)
-def _sheared(weights, volumes, surfaces, roundness, facet_vertices, n, sizes):
-    """Wetted surfaces times the shear on them, relative to that in a narrow throat: √(1 + (c R_h / r)²), on walls λ.
+def _sheared(weights, volumes, surfaces, roundness, facet_vertices, vertices):
+    """(f, 3): wetted surfaces times the shear on them, relative to a narrow throat: √(1 + (c R_h / r)²), on walls λ.
 
     It is in proportion to 1 / R_h in a throat that is narrow for its spheres, to c / r on a sphere with much room.
     """
@@ -220,8 +238,8 @@ def _sheared(weights, volumes, surfaces, roundness, facet_vertices, n, sizes):
         radius = volumes[f] / surfaces[f]
         for v in range(3):
             k = facet_vertices[f, v]
-            if k < n:
-                sheared[f, v] *= np.sqrt(1.0 + (SHEAR * radius / sizes[k]) ** 2)
+            if k < vertices.n_spheres:
+                sheared[f, v] *= np.sqrt(1.0 + (SHEAR * radius / vertices.sizes[k]) ** 2)
             else:
                 sheared[f, v] *= roundness[f]
     return sheared
@@ -251,16 +269,16 @@ def _drag_fractions(weights, sums, facets):
 
 
 @njit(cache=True)
-def _scatter(facet_vertices, drops, by_pressure, by_drag, pressure, viscous):
-    """Add every facet's forces to its vertices."""
+def _scatter(facet_vertices, drops, forces, pressure, viscous):
+    """Add the forces on every facet's vertices, for its pressure drop, to `pressure` and `viscous` (n + 6, 3) [N]."""
     for f in range(facet_vertices.shape[0]):
         if drops[f] == 0.0:
             continue
         for v in range(3):
             k = facet_vertices[f, v]
             for axis in range(3):
-                pressure[k, axis] += by_pressure[f, v, axis] * drops[f]
-                viscous[k, axis] += by_drag[f, v, axis] * drops[f]
+                pressure[k, axis] += forces.pressure[f, v, axis] * drops[f]
+                viscous[k, axis] += forces.drag[f, v, axis] * drops[f]
 
 
 def _hydrostatic(mesh, weight):

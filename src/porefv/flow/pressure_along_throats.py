@@ -12,6 +12,8 @@ for dΦ/dx = (1 + x²)^{-5/2}, as A^{-5/2} of a section A = A^f (1 + s² / e²).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from porefv.conductance.section_friction.friction_kernels import STRETCH
@@ -25,108 +27,154 @@ _ACROSS, _ACROSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ACROSS, _ACROSS_WEIGHTS = 0.5 * (_ACROSS + 1.0), 0.5 * _ACROSS_WEIGHTS
 
 
+class ThroatDrops(NamedTuple):
+    """How the pressure falls along each throat, by facet.
+
+    Attributes
+    ----------
+    doubling_heights : (f,) array
+        e, the height at which the section of the facet's throat is twice its neck's; not positive: left out [m].
+    drag_fractions : (f, 3) array
+        Of the drag on the throat's solid, among the vertices of all its facets [-].
+    """
+
+    doubling_heights: np.ndarray
+    drag_fractions: np.ndarray
+
+
+class Fall(NamedTuple):
+    """Fall of the pressure along a throat on one side of its neck.
+
+    Attributes
+    ----------
+    scale : float
+        β / e [1/m].
+    end : float
+        Φ at the pore's Laguerre vertex, negative on the first side [-].
+    drop : float
+        Part of the throat's pressure drop on this side [-].
+    """
+
+    scale: float
+    end: float
+    drop: float
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
-def apply_pressure_along_throats(
-    throats, starts, facets, facet_cells, facet_vertices, n, points, sizes, vertices, normals, necks, fractions,
-    pressure, drag,
-):  # fmt: skip
-    """Move the part of the drag that is pressure along the throats from `drag` to `pressure`, for unit drops.
+def apply_pressure_along_throats(which, throats, facets, vertices, laguerre_vertices, drops, pressure, drag):
+    """Move the part of the drag that is pressure along the throats from `drag` to `pressure`.
 
     Parameters
     ----------
-    throats : (t,) array
-        Throats to treat; throat t has the facets starts[t] to starts[t + 1] of `facets`.
-    necks : (f,) array
-        e, the height at which the section of each facet's throat is twice its neck's; not positive: left out [m].
-    fractions : (f, 3) array
-        Of the drag, among the vertices of all facets of a throat.
+    which : (u,) int array
+        Consecutive throats to treat.
+    throats : ThroatFacets
+    facets : FacetPlanes
+    vertices : Vertices
+    laguerre_vertices : (m, 3) array
+        Of the cells [m].
+    drops : ThroatDrops
     pressure, drag : (m, 3, 3) arrays
-        Forces on the vertices of the facets of `throats`, one after another, added to in place [m²]. Their sum stays.
+        Forces on the vertices of the facets of the throats to treat, one after another, for a unit pressure drop, added
+        to in place [m²]. Their sum stays.
     """
-    for i in prange(throats.shape[0]):
-        start = starts[throats[i]]
-        stop = starts[throats[i] + 1]
-        row = start - starts[throats[0]]
-        f = facets[start]
-        if not necks[f] > 0.0:
+    n, points, _ = vertices
+    for i in prange(which.shape[0]):
+        start = throats.starts[which[i]]
+        own = throats.facets[start : throats.starts[which[i] + 1]]
+        row = start - throats.starts[which[0]]
+        f = own[0]
+        height = drops.doubling_heights[f]
+        if not height > 0.0:
             continue
-        scale = STRETCH / necks[f]
-        normal = vector_at(f, normals)
-        first = vector_at(facet_vertices[f, 0], points)
+        scale = STRETCH / height
+        normal = vector_at(f, facets.normals)
+        first = vector_at(facets.vertices[f, 0], points)
         # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
-        low = min(_fall(scale * dot(minus(vector_at(facet_cells[f, 0], vertices), first), normal), 1.0), 0.0)
-        high = max(_fall(scale * dot(minus(vector_at(facet_cells[f, 1], vertices), first), normal), 1.0), 0.0)
+        pi = vector_at(facets.cells[f, 0], laguerre_vertices)
+        pj = vector_at(facets.cells[f, 1], laguerre_vertices)
+        low = min(_fall(scale * dot(minus(pi, first), normal), 1.0), 0.0)
+        high = max(_fall(scale * dot(minus(pj, first), normal), 1.0), 0.0)
         if not high - low > 0.0:
             continue
         moved = np.zeros(3)
-        for j in range(start, stop):
+        for j in range(own.shape[0]):
+            sense = _sense(own[j], f, facets)
             for v in range(3):
-                k = facet_vertices[facets[j], v]
+                k = facets.vertices[own[j], v]
                 if k >= n:
                     continue
-                after, before = facet_vertices[f, (v + 1) % 3], facet_vertices[f, (v + 2) % 3]
-                if stop - start > 1:
-                    after, before = _neighbours(k, facets[start:stop], j - start, facet_vertices, normals)
+                after, before = facets.vertices[f, (v + 1) % 3], facets.vertices[f, (v + 2) % 3]
+                if own.shape[0] > 1:
+                    after, before = _neighbours(k, j, own, facets)
                     if after < 0:
                         continue
-                a = unit(towards(k, after, n, points))
-                b = unit(towards(k, before, n, points))
+                a = unit(towards(k, after, vertices))
+                b = unit(towards(k, before, vertices))
+                centre = vector_at(k, points)
                 for side in range(2):
                     end = high if side == 1 else low
                     drop = abs(end) / (high - low)
                     if drop > 0.0:
-                        to_vertex = minus(vector_at(facet_cells[f, side], vertices), vector_at(k, points))
-                        patch = _patch(a, b, to_vertex, sizes[k], normal, scale, end, drop)
-                        sense = 1.0 if dot(normal, vector_at(facets[j], normals)) > 0.0 else -1.0
+                        c = unit(minus(pj if side == 1 else pi, centre))
+                        patch = _patch(a, b, c, vertices.sizes[k], normal, Fall(scale, end, drop))
                         for axis in range(3):
-                            pressure[row + j - start, v, axis] += sense * patch[axis]
+                            pressure[row + j, v, axis] += sense * patch[axis]
                             moved[axis] += patch[axis]
         for axis in range(3):
-            on_wall = _wall_across(axis, facets[start:stop], facet_vertices, n, points)
-            for j in range(start, stop):
-                sense = 1.0 if dot(normal, vector_at(facets[j], normals)) > 0.0 else -1.0
+            on_wall = _wall_across(axis, own, facets, vertices)
+            for j in range(own.shape[0]):
+                sense = _sense(own[j], f, facets)
                 for v in range(3):
+                    k = facets.vertices[own[j], v]
                     if on_wall == 0:
-                        drag[row + j - start, v, axis] -= sense * fractions[facets[j], v] * moved[axis]
-                    elif facet_vertices[facets[j], v] >= n and points[facet_vertices[facets[j], v], axis] != 0.0:
-                        pressure[row + j - start, v, axis] -= sense * moved[axis] / on_wall
+                        drag[row + j, v, axis] -= sense * drops.drag_fractions[own[j], v] * moved[axis]
+                    elif k >= n and points[k, axis] != 0.0:
+                        pressure[row + j, v, axis] -= sense * moved[axis] / on_wall
 
 
 @njit(cache=True)
-def _wall_across(axis, facets, facet_vertices, n, points):
-    """How many of a throat's facets stand on a wall across an axis.
+def _sense(f, first, facets):
+    """1 where facet f has the sense of facet `first`, else -1."""
+    return 1.0 if dot(vector_at(first, facets.normals), vector_at(f, facets.normals)) > 0.0 else -1.0
+
+
+@njit(cache=True)
+def _wall_across(axis, own, facets, vertices):
+    """How many of a throat's own facets stand on a wall across an axis.
 
     Its pressure falls along the throat, too, and takes up what spheres bear along the axis: with the throat's image
     behind the wall they would bear nothing.
     """
     count = 0
-    for j in range(facets.shape[0]):
+    for j in range(own.shape[0]):
         for v in range(3):
-            k = facet_vertices[facets[j], v]
-            if k >= n and points[k, axis] != 0.0:
+            k = facets.vertices[own[j], v]
+            if k >= vertices.n_spheres and vertices.points[k, axis] != 0.0:
                 count += 1
     return count
 
 
 @njit(cache=True)
-def _neighbours(k, facets, which, facet_vertices, normals):
+def _neighbours(k, which, own, facets):
     """The vertices before and after k around a throat, in the sense of its first facet; -1, -1 but for k's first facet.
 
-    Where a tie has cut the throat in several facets, those that k has in common with one facet alone.
+    `own` are the throat's facets, of which the one in place `which` is treated. Where a tie has cut the throat in
+    several facets, the neighbours are those that k has in common with one facet alone.
     """
     after = before = -1
-    for j in range(facets.shape[0]):
-        v = _place(k, facets[j], facet_vertices)
+    for j in range(own.shape[0]):
+        v = _place(k, own[j], facets)
         if v < 0:
             continue
         if j < which:
             return -1, -1
-        following, leading = _around(v, facets[j], facets[0], facet_vertices, normals)
+        following, leading = _around(v, own[j], own[0], facets)
         inner_a = inner_b = False
-        for m in range(facets.shape[0]):
-            u = _place(k, facets[m], facet_vertices)
+        for m in range(own.shape[0]):
+            u = _place(k, own[m], facets)
             if m != j and u >= 0:
-                other_a, other_b = _around(u, facets[m], facets[0], facet_vertices, normals)
+                other_a, other_b = _around(u, own[m], own[0], facets)
                 inner_a |= other_b == following
                 inner_b |= other_a == leading
         if not inner_a:
@@ -137,19 +185,20 @@ def _neighbours(k, facets, which, facet_vertices, normals):
 
 
 @njit(cache=True)
-def _place(k, f, facet_vertices):
+def _place(k, f, facets):
+    """Place of vertex k in facet f, -1 if it is none of its vertices."""
     for v in range(3):
-        if facet_vertices[f, v] == k:
+        if facets.vertices[f, v] == k:
             return v
     return -1
 
 
 @njit(cache=True)
-def _around(v, f, first, facet_vertices, normals):
+def _around(v, f, first, facets):
     """The other two vertices of facet f, after and before its vertex v in the sense of facet `first`."""
-    following = facet_vertices[f, (v + 1) % 3]
-    leading = facet_vertices[f, (v + 2) % 3]
-    if dot(vector_at(f, normals), vector_at(first, normals)) > 0.0:
+    following = facets.vertices[f, (v + 1) % 3]
+    leading = facets.vertices[f, (v + 2) % 3]
+    if _sense(f, first, facets) > 0.0:
         return following, leading
     return leading, following
 
@@ -162,14 +211,14 @@ def _fall(x, square):
 
 
 @njit(cache=True, error_model="numpy")
-def _patch(a, b, to_vertex, radius, normal, scale, end, drop):
-    """Force on a sphere's patch by the pressure's fall between a pore's vertex and the neck, `drop` in all.
+def _patch(a, b, c, radius, normal, fall):
+    """Force on a sphere's patch by the pressure's fall (`Fall`) between a pore's Laguerre vertex and the neck.
 
-    The patch spans from a to b, unit vectors in the neck, and the vertex, where Φ is `end`. There is none where points
-    on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a facet's corner of
-    nearly 180° with the vertex opposite in its plane.
+    The patch spans between three unit vectors from the sphere's centre: a and b in the neck, c to the vertex. There is
+    none where points on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a
+    facet's corner of nearly 180° with the vertex opposite in its plane.
     """
-    c = unit(to_vertex)
+    scale, end, drop = fall
     steep = dot(c, normal)
     # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
     volume = dot(cross_product(a, b), c)

@@ -12,7 +12,7 @@ from porefv.system.kernels import njit, prange
 
 @njit(cache=True)
 def _sorted_vertices(t, cells, n):
-    """Vertices of cell t, spheres first, and how many are spheres."""
+    """(4,) int32: vertices of cell t, the spheres first; and how many are spheres (vertices below n)."""
     s = np.empty(4, np.int32)
     ns = 0
     for i in range(4):
@@ -28,39 +28,39 @@ def _sorted_vertices(t, cells, n):
 
 
 @njit(cache=True, parallel=True)
-def polyhedron_volumes(cells, n, points, sizes):
+def polyhedron_volumes(cells, vertices):
     """Volume of each cell: its spheres' centres swept to its walls."""
     volumes = np.empty(cells.shape[0])
     for t in prange(cells.shape[0]):
-        s, ns = _sorted_vertices(t, cells, n)
+        s, ns = _sorted_vertices(t, cells, vertices.n_spheres)
         if ns == 4:
-            u = cross_product(towards(s[0], s[1], n, points), towards(s[0], s[2], n, points))
-            volumes[t] = abs(dot(u, towards(s[0], s[3], n, points))) / 6.0
+            u = cross_product(towards(s[0], s[1], vertices), towards(s[0], s[2], vertices))
+            volumes[t] = abs(dot(u, towards(s[0], s[3], vertices))) / 6.0
         elif ns == 3:
-            u = cross_product(towards(s[0], s[1], n, points), towards(s[0], s[2], n, points))
-            base = 0.5 * abs(dot(u, (points[s[3], 0], points[s[3], 1], points[s[3], 2])))
+            u = cross_product(towards(s[0], s[1], vertices), towards(s[0], s[2], vertices))
+            base = 0.5 * abs(dot(u, vector_at(s[3], vertices.points)))
             height = 0.0
             for i in range(3):
-                height += wall_distance(s[i], s[3], points, sizes)
+                height += wall_distance(s[i], s[3], vertices)
             volumes[t] = base * height / 3.0
         elif ns == 2:
-            u = towards(s[0], s[1], n, points)
-            d = cross_product(towards(s[0], s[2], n, points), towards(s[0], s[3], n, points))
-            a0 = wall_distance(s[0], s[2], points, sizes)
-            a1 = wall_distance(s[1], s[2], points, sizes)
-            b0 = wall_distance(s[0], s[3], points, sizes)
-            b1 = wall_distance(s[1], s[3], points, sizes)
+            u = towards(s[0], s[1], vertices)
+            d = cross_product(towards(s[0], s[2], vertices), towards(s[0], s[3], vertices))
+            a0 = wall_distance(s[0], s[2], vertices)
+            a1 = wall_distance(s[1], s[2], vertices)
+            b0 = wall_distance(s[0], s[3], vertices)
+            b1 = wall_distance(s[1], s[3], vertices)
             # Both widths vary linearly along the edge.
             volumes[t] = abs(dot(u, d)) * (2.0 * a0 * b0 + 2.0 * a1 * b1 + a0 * b1 + a1 * b0) / 6.0
         else:
             volumes[t] = 1.0
             for i in range(1, 4):
-                volumes[t] *= wall_distance(s[0], s[i], points, sizes)
+                volumes[t] *= wall_distance(s[0], s[i], vertices)
     return volumes
 
 
 @njit(cache=True, parallel=True)
-def volume_gradients(cells, n, points, sizes):
+def volume_gradients(cells, vertices):
     """(m, 4, 3): derivative of the volume of each cell by the place of each of its vertices.
 
     A wall's place is that along its outward normal: its derivative, a vector along that, is the area of the cell's
@@ -68,8 +68,8 @@ def volume_gradients(cells, n, points, sizes):
     """
     gradients = np.empty((cells.shape[0], 4, 3))
     for t in prange(cells.shape[0]):
-        s, ns = _sorted_vertices(t, cells, n)
-        by = _gradients_by_vertex(s, ns, n, points, sizes)
+        s, ns = _sorted_vertices(t, cells, vertices.n_spheres)
+        by = _gradients_by_vertex(s, ns, vertices)
         for i in range(4):
             for j in range(4):
                 if s[j] == cells[t, i]:
@@ -79,41 +79,41 @@ def volume_gradients(cells, n, points, sizes):
 
 
 @njit(cache=True)
-def _gradients_by_vertex(s, ns, n, points, sizes):
+def _gradients_by_vertex(s, ns, vertices):
     """(4, 3): derivatives of one cell's volume; spheres come first in s."""
     by = np.zeros((4, 3))
     a = s[0]
     if ns == 4:
-        u = towards(a, s[1], n, points)
-        v = towards(a, s[2], n, points)
-        w = towards(a, s[3], n, points)
+        u = towards(a, s[1], vertices)
+        v = towards(a, s[2], vertices)
+        w = towards(a, s[3], vertices)
         share = (1.0 if dot(cross_product(u, v), w) > 0.0 else -1.0) / 6.0
         _add_difference(by, 1, share, cross_product(v, w))
         _add_difference(by, 2, share, cross_product(w, u))
         _add_difference(by, 3, share, cross_product(u, v))
     elif ns == 3:
-        d = vector_at(s[3], points)
-        u = towards(a, s[1], n, points)
-        v = towards(a, s[2], n, points)
+        d = vector_at(s[3], vertices.points)
+        u = towards(a, s[1], vertices)
+        v = towards(a, s[2], vertices)
         base = 0.5 * dot(cross_product(u, v), d)
         share = (1.0 if base > 0.0 else -1.0) / 3.0
         height = 0.0
         for i in range(3):
-            height += wall_distance(s[i], s[3], points, sizes)
+            height += wall_distance(s[i], s[3], vertices)
             _add(by, i, -share * base, d)
         _add(by, 3, 3.0 * share * base, d)
         _add_difference(by, 1, 0.5 * share * height, cross_product(v, d))
         _add_difference(by, 2, 0.5 * share * height, cross_product(d, u))
     elif ns == 2:
-        d = vector_at(s[2], points)
-        e = vector_at(s[3], points)
+        d = vector_at(s[2], vertices.points)
+        e = vector_at(s[3], vertices.points)
         edge = cross_product(d, e)
-        length = dot(towards(a, s[1], n, points), edge)
+        length = dot(towards(a, s[1], vertices), edge)
         share = (1.0 if length > 0.0 else -1.0) / 6.0
-        d0 = wall_distance(a, s[2], points, sizes)
-        d1 = wall_distance(s[1], s[2], points, sizes)
-        e0 = wall_distance(a, s[3], points, sizes)
-        e1 = wall_distance(s[1], s[3], points, sizes)
+        d0 = wall_distance(a, s[2], vertices)
+        d1 = wall_distance(s[1], s[2], vertices)
+        e0 = wall_distance(a, s[3], vertices)
+        e1 = wall_distance(s[1], s[3], vertices)
         _add_difference(by, 1, share * (2.0 * d0 * e0 + 2.0 * d1 * e1 + d0 * e1 + d1 * e0), edge)
         by_d0 = share * length * (2.0 * e0 + e1)
         by_d1 = share * length * (2.0 * e1 + e0)
@@ -130,9 +130,9 @@ def _gradients_by_vertex(s, ns, n, points, sizes):
             face = 1.0
             for j in range(1, 4):
                 if j != i:
-                    face *= wall_distance(a, s[j], points, sizes)
-            _add(by, i, face, vector_at(s[i], points))
-            _add(by, 0, -face, vector_at(s[i], points))
+                    face *= wall_distance(a, s[j], vertices)
+            _add(by, i, face, vector_at(s[i], vertices.points))
+            _add(by, 0, -face, vector_at(s[i], vertices.points))
     return by
 
 
@@ -150,27 +150,27 @@ def _add_difference(by, i, factor, vector):
 
 
 @njit(cache=True, parallel=True)
-def cell_solids(cells, n, points, sizes):
+def cell_solids(cells, vertices):
     """Volume of the balls, each cut by its Laguerre planes, within each cell."""
     solids = np.zeros(cells.shape[0])
     for t in prange(cells.shape[0]):
         total = 0.0
         for i in range(4):
             k = cells[t, i]
-            if k >= n:
+            if k >= vertices.n_spheres:
                 continue
-            u = towards(k, cells[t, (i + 1) % 4], n, points)
-            v = towards(k, cells[t, (i + 2) % 4], n, points)
-            w = towards(k, cells[t, (i + 3) % 4], n, points)
+            u = towards(k, cells[t, (i + 1) % 4], vertices)
+            v = towards(k, cells[t, (i + 2) % 4], vertices)
+            w = towards(k, cells[t, (i + 3) % 4], vertices)
             numerator, denominator = _tangent(u, v, w)
-            r = sizes[k]
+            r = vertices.sizes[k]
             total += 2.0 * np.arctan2(abs(numerator), denominator) * r * r * r / 3.0
             for j in range(3):
                 m = cells[t, (i + 1 + j) % 4]
                 edge = u if j == 0 else (v if j == 1 else w)
-                if not crosses_laguerre_plane(k, m, edge, n, points, sizes):
+                if not crosses_laguerre_plane(k, m, edge, vertices):
                     continue
-                d, _ = laguerre_plane_distances(k, m, edge, n, points, sizes)
+                d, _ = laguerre_plane_distances(k, m, edge, vertices)
                 a = cross_product(edge, v if j == 0 else (w if j == 1 else u))
                 b = cross_product(edge, w if j == 0 else (u if j == 1 else v))
                 x = cross_product(a, b)
@@ -182,8 +182,9 @@ def cell_solids(cells, n, points, sizes):
 
 
 @njit(cache=True)
-def enumerate_wall_faces(cells, n, points, sizes):
+def enumerate_wall_faces(cells, vertices):
     """Face of each cell on each of its walls: the facet opposite to the wall, projected on it."""
+    n = vertices.n_spheres
     count = 0
     for t in range(cells.shape[0]):
         for i in range(4):
@@ -200,12 +201,12 @@ def enumerate_wall_faces(cells, n, points, sizes):
             if wall < n:
                 continue
             a, b, c = spheres_first(cells[t, (i + 1) % 4], cells[t, (i + 2) % 4], cells[t, (i + 3) % 4], n)
-            direction = (points[wall, 0], points[wall, 1], points[wall, 2])
-            x = centroid(a, b, c, n, points, sizes)
-            gap = sizes[wall] - dot(x, direction)
+            direction = vector_at(wall, vertices.points)
+            x = centroid(a, b, c, vertices)
+            gap = vertices.sizes[wall] - dot(x, direction)
             face_cells[f] = t
             walls[f] = wall - n
-            areas[f] = abs(dot(area_vector(a, b, c, n, points, sizes), direction))
+            areas[f] = abs(dot(area_vector(a, b, c, vertices), direction))
             for axis in range(3):
                 centroids[f, axis] = x[axis] + gap * direction[axis]
             f += 1

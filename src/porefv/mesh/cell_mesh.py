@@ -16,6 +16,7 @@ from porefv.packing.box import WALL_NORMALS, Box
 from porefv.packing.memory_estimate import ensure_room_for_spheres
 from porefv.packing.packing import Packing
 from porefv.tessellation.triangulation import RegularTriangulation, wall_offsets
+from porefv.tessellation.vertices import Vertices
 
 if TYPE_CHECKING:
     import meshio
@@ -115,10 +116,15 @@ class CellMesh:
         return np.concatenate([self.packing.radii, wall_offsets(self.box, self.triangulation.origin)])
 
     @cached_property
+    def cell_vertices(self) -> Vertices:
+        """The spheres and walls that are the vertices of the cells, as kernels take them."""
+        return Vertices(self.n_spheres, self.local_points, self.sizes)
+
+    @cached_property
     def local_vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex of each cell from the local origin, that of a flat cell being a neighbour's [m]."""
         vertices = self.triangulation.local_vertices.copy()
-        settle_flat_cells(self.cells, self.neighbours, self.local_points, self.n_spheres, vertices)
+        settle_flat_cells(self.cells, self.neighbours, self.cell_vertices, vertices)
         return vertices
 
     @cached_property
@@ -129,7 +135,7 @@ class CellMesh:
     @cached_property
     def cell_volumes(self) -> np.ndarray:
         """(m,): volume of each cell, tetrahedron, wedge or hexahedron; they fill the box [m³]."""
-        return polyhedron_volumes(self.cells, self.n_spheres, self.local_points, self.sizes)
+        return polyhedron_volumes(self.cells, self.cell_vertices)
 
     def cell_volume_rates(self, velocities: np.ndarray, wall_speeds: np.ndarray) -> np.ndarray:
         """Rate of the volume of each cell where spheres and walls move, at fixed topology (C14 eq. 25).
@@ -157,12 +163,12 @@ class CellMesh:
 
         A wall's place is that along its outward normal: its derivative is the cell's face on it, times that normal.
         """
-        return volume_gradients(self.cells, self.n_spheres, self.local_points, self.sizes)
+        return volume_gradients(self.cells, self.cell_vertices)
 
     @cached_property
     def cell_void_volumes(self) -> np.ndarray:
         """(m,): volume of each cell outside the spheres [m³]."""
-        return self.cell_volumes - cell_solids(self.cells, self.n_spheres, self.local_points, self.sizes)
+        return self.cell_volumes - cell_solids(self.cells, self.cell_vertices)
 
     @cached_property
     def laguerre_volumes(self) -> np.ndarray:
@@ -170,14 +176,12 @@ class CellMesh:
 
         They fill the box: each sphere with its share of the void.
         """
-        return laguerre_volumes(
-            self.facets.cells, self.facets.vertices, self.local_vertices, self.n_spheres, self.local_points, self.sizes
-        )
+        return laguerre_volumes(self.facets.topology, self.local_vertices, self.cell_vertices)
 
     @cached_property
     def wall_faces(self) -> WallFaces:
         """The faces of the cells on the walls: they tile the box's surface."""
-        return WallFaces(*enumerate_wall_faces(self.cells, self.n_spheres, self.local_points, self.sizes))
+        return WallFaces(*enumerate_wall_faces(self.cells, self.cell_vertices))
 
     # ---- the mesh for others ------------------------------------------------------------------------------------
 

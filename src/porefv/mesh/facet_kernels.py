@@ -1,4 +1,4 @@
-"""Kernels of the facets: their vertices, corners, angles, area vectors and centroids.
+"""Kernels of the facets: their vertices, angles, areas and centroids.
 
 A facet is a triangle (three spheres), a trapezoid (two spheres swept to a wall) or a rectangle (one sphere swept to two
 walls). Its vertices are stored spheres first, in cyclic order, such that the normal (b - a) × (c - a), a wall standing
@@ -7,23 +7,80 @@ for its outward direction, points from the first cell to the second.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from porefv.mesh.vectors import cross_product, dot, minus, towards, wall_distance
+from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, vector_at, wall_distance
 from porefv.system.kernels import njit, prange
+
+
+class FacetTopology(NamedTuple):
+    """Which cells and vertices each facet has.
+
+    Attributes
+    ----------
+    cells : (f, 2) int32 array
+        The two cells of each facet; its normal points from the first to the second.
+    vertices : (f, 3) int32 array
+        Vertices of each facet, spheres first, right-handed about its normal.
+    """
+
+    cells: np.ndarray
+    vertices: np.ndarray
+
+
+class FacetPlanes(NamedTuple):
+    """`FacetTopology` and the plane of each facet.
+
+    Attributes
+    ----------
+    cells, vertices : (f, 2), (f, 3) int32 arrays
+        As of `FacetTopology`.
+    normals : (f, 3) array
+        Unit normal of each facet [-].
+    """
+
+    cells: np.ndarray
+    vertices: np.ndarray
+    normals: np.ndarray
+
+
+class Frame(NamedTuple):
+    """One facet, as seen from its first vertex, which is a sphere.
+
+    Attributes
+    ----------
+    a, b, c : int
+        Vertices.
+    ab, ac : vectors
+        From the centre of a to b and c; to a wall, its outward unit normal [m, -].
+    cross : vector
+        ab × ac, along the facet's normal.
+    twice : float
+        |ab × ac|: twice the area of a triangle.
+    """
+
+    a: int
+    b: int
+    c: int
+    ab: tuple[float, float, float]
+    ac: tuple[float, float, float]
+    cross: tuple[float, float, float]
+    twice: float
 
 
 @njit(cache=True)
 def spheres_first(a, b, c, n):
-    """The three vertices turned, in cyclic order, until the spheres come first."""
+    """The three vertices turned, in cyclic order, until the spheres, which are below n, come first."""
     while a >= n or (b >= n and c < n):
         a, b, c = b, c, a
     return a, b, c
 
 
 @njit(cache=True)
-def enumerate_facets(cells, neighbours, n, facet_cells, vertices):
-    """Facets between cells t < u, their cells (f, 2) and vertices (f, 3), in the order of t; returns f."""
+def enumerate_facets(cells, neighbours, n, facets):
+    """Fill the `FacetTopology` with the facets between cells t < u, in the order of t; n is the number of spheres."""
     f = 0
     for t in range(cells.shape[0]):
         for i in range(4):
@@ -39,83 +96,82 @@ def enumerate_facets(cells, neighbours, n, facet_cells, vertices):
             else:
                 a, b, c = cells[t, 0], cells[t, 1], cells[t, 2]
             a, b, c = spheres_first(a, b, c, n)
-            facet_cells[f, 0] = t
-            facet_cells[f, 1] = neighbours[t, i]
-            vertices[f, 0] = a
-            vertices[f, 1] = b
-            vertices[f, 2] = c
+            facets.cells[f, 0] = t
+            facets.cells[f, 1] = neighbours[t, i]
+            facets.vertices[f, 0] = a
+            facets.vertices[f, 1] = b
+            facets.vertices[f, 2] = c
             f += 1
-    return f
 
 
 @njit(cache=True)
-def area_vector(a, b, c, n, points, sizes):
-    """Area vector of a facet: triangle, trapezoid or rectangle."""
-    s = cross_product(towards(a, b, n, points), towards(a, c, n, points))
-    if c < n:
-        factor = 0.5
-    elif b < n:
-        factor = 0.5 * (wall_distance(a, c, points, sizes) + wall_distance(b, c, points, sizes))
-    else:
-        factor = wall_distance(a, b, points, sizes) * wall_distance(a, c, points, sizes)
-    return factor * s[0], factor * s[1], factor * s[2]
-
-
-@njit(cache=True)
-def centroid(a, b, c, n, points, sizes):
-    """Centroid of a facet."""
-    u = towards(a, b, n, points)
-    w = towards(a, c, n, points)
-    if c < n:
-        s, t = 1.0 / 3.0, 1.0 / 3.0
-    elif b < n:  # a trapezoid over the edge ab, its sides ha and hb
-        ha = wall_distance(a, c, points, sizes)
-        hb = wall_distance(b, c, points, sizes)
-        s = (ha + 2.0 * hb) / (3.0 * (ha + hb))
-        t = (ha * ha + ha * hb + hb * hb) / (3.0 * (ha + hb))
-    else:
-        s = 0.5 * wall_distance(a, b, points, sizes)
-        t = 0.5 * wall_distance(a, c, points, sizes)
-    return (
-        points[a, 0] + s * u[0] + t * w[0],
-        points[a, 1] + s * u[1] + t * w[1],
-        points[a, 2] + s * u[2] + t * w[2],
-    )
-
-
-@njit(cache=True)
-def facet_corners(f, facet_vertices, n, points):
-    """Vertices a, b, c of facet f, the vectors from a to b and to c, their cross product and its length.
-
-    The product has the facet's sense, and belongs to the angles at all three vertices.
-    """
-    a = facet_vertices[f, 0]
-    b = facet_vertices[f, 1]
-    c = facet_vertices[f, 2]
-    ab = towards(a, b, n, points)
-    ac = towards(a, c, n, points)
+def facet_frame(a, b, c, vertices):
+    """`Frame` of the facet with these vertices, spheres first."""
+    ab = towards(a, b, vertices)
+    ac = towards(a, c, vertices)
     cross = cross_product(ab, ac)
-    return a, b, c, ab, ac, cross, np.sqrt(dot(cross, cross))
+    return Frame(a, b, c, ab, ac, cross, np.sqrt(dot(cross, cross)))
 
 
 @njit(cache=True)
-def facet_angles(b, c, n, ab, ac, twice):
-    """Angles of a facet at its vertices, 0 at walls: b, c its second and third, the rest as of `facet_corners`."""
-    if b >= n:
+def frame_of(f, facets, vertices):
+    """`Frame` of facet f."""
+    return facet_frame(facets.vertices[f, 0], facets.vertices[f, 1], facets.vertices[f, 2], vertices)
+
+
+@njit(cache=True)
+def area_factor(frame, vertices):
+    """Area of a facet over |ab × ac|: of a triangle ½ [-], of a trapezoid its mean height, of a rectangle its area."""
+    a, b, c = frame.a, frame.b, frame.c
+    if c < vertices.n_spheres:
+        return 0.5
+    if b < vertices.n_spheres:
+        return 0.5 * (wall_distance(a, c, vertices) + wall_distance(b, c, vertices))
+    return wall_distance(a, b, vertices) * wall_distance(a, c, vertices)
+
+
+@njit(cache=True)
+def area_vector(a, b, c, vertices):
+    """Area vector of a facet: triangle, trapezoid or rectangle [m²]."""
+    frame = facet_frame(a, b, c, vertices)
+    return times(area_factor(frame, vertices), frame.cross)
+
+
+@njit(cache=True)
+def facet_angles(frame, n):
+    """Angles of a facet at its three vertices, 0 at walls, which are from n on."""
+    if frame.b >= n:
         return 0.5 * np.pi, 0.0, 0.0
-    at_a = np.arctan2(twice, dot(ab, ac))
-    if c >= n:
+    at_a = np.arctan2(frame.twice, dot(frame.ab, frame.ac))
+    if frame.c >= n:
         return at_a, np.pi - at_a, 0.0
-    at_b = np.arctan2(twice, dot(minus(ab, ac), ab))
+    at_b = np.arctan2(frame.twice, dot(minus(frame.ab, frame.ac), frame.ab))
     return at_a, at_b, np.pi - at_a - at_b
 
 
 @njit(cache=True)
-def facet_centroids(facet_vertices, n, points, sizes):
-    """(f, 3): centroid of each facet."""
+def centroid(a, b, c, vertices):
+    """Centroid of a facet, from the local origin [m]."""
+    if c < vertices.n_spheres:
+        s, t = 1.0 / 3.0, 1.0 / 3.0
+    elif b < vertices.n_spheres:  # a trapezoid over the edge ab, its sides ha and hb
+        ha = wall_distance(a, c, vertices)
+        hb = wall_distance(b, c, vertices)
+        s = (ha + 2.0 * hb) / (3.0 * (ha + hb))
+        t = (ha * ha + ha * hb + hb * hb) / (3.0 * (ha + hb))
+    else:
+        s = 0.5 * wall_distance(a, b, vertices)
+        t = 0.5 * wall_distance(a, c, vertices)
+    within = plus(times(s, towards(a, b, vertices)), times(t, towards(a, c, vertices)))
+    return plus(vector_at(a, vertices.points), within)
+
+
+@njit(cache=True)
+def facet_centroids(facet_vertices, vertices):
+    """(f, 3): centroid of each facet [m]."""
     centres = np.empty((facet_vertices.shape[0], 3))
     for f in range(facet_vertices.shape[0]):
-        x = centroid(facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2], n, points, sizes)
+        x = centroid(facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2], vertices)
         for axis in range(3):
             centres[f, axis] = x[axis]
     return centres

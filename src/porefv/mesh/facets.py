@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from porefv.mesh.facet_cross_sections import facet_cross_sections
-from porefv.mesh.facet_kernels import enumerate_facets, facet_centroids, row_sums
+from porefv.mesh.facet_cross_sections import CrossSections, facet_cross_sections
+from porefv.mesh.facet_kernels import FacetPlanes, FacetTopology, enumerate_facets, facet_centroids
 from porefv.mesh.facet_volumes import facet_volumes
 
 if TYPE_CHECKING:
@@ -37,23 +37,24 @@ class Facets:
     # ---- topology -------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _topology(self) -> tuple[np.ndarray, np.ndarray]:
+    def topology(self) -> FacetTopology:
+        """Cells and vertices of each facet, as kernels take them."""
         mesh = self.mesh
         # Every cell has four facets, each shared by two, but for the eight at the corners of the box.
         count = (4 * mesh.n_cells - 8) // 2
-        cells, vertices = np.empty((count, 2), np.int32), np.empty((count, 3), np.int32)
-        enumerate_facets(mesh.cells, mesh.neighbours, mesh.n_spheres, cells, vertices)
-        return cells, vertices
+        found = FacetTopology(np.empty((count, 2), np.int32), np.empty((count, 3), np.int32))
+        enumerate_facets(mesh.cells, mesh.neighbours, mesh.n_spheres, found)
+        return found
 
     @property
     def cells(self) -> np.ndarray:
         """(f, 2) int32: the two cells of each facet; its normal points from the first to the second."""
-        return self._topology[0]
+        return self.topology.cells
 
     @property
     def vertices(self) -> np.ndarray:
         """(f, 3) int32: vertices of each facet, spheres first, right-handed about its normal."""
-        return self._topology[1]
+        return self.topology.vertices
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -61,60 +62,62 @@ class Facets:
     # ---- the facet as a cross-section -------------------------------------------------------------------------------
 
     @cached_property
-    def _cross_sections(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        mesh, f = self.mesh, len(self)
-        arrays = np.empty((f, 3)), np.empty(f), np.empty(f), np.empty((f, 3)), np.empty(f, bool)
-        facet_cross_sections(
-            self.cells, self.vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, *arrays
-        )
-        return arrays
+    def _cross_sections(self) -> CrossSections:
+        f = len(self)
+        found = CrossSections(
+            normals=np.empty((f, 3)), lengths=np.empty(f), areas=np.empty(f), fluid_areas=np.empty(f),
+            sectors=np.empty((f, 3)), covered=np.empty(f, bool),
+        )  # fmt: skip
+        facet_cross_sections(self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, found)
+        return found
+
+    @property
+    def planes(self) -> FacetPlanes:
+        """Cells, vertices and normal of each facet, as kernels take them."""
+        return FacetPlanes(self.cells, self.vertices, self.normals)
 
     @property
     def normals(self) -> np.ndarray:
         """(f, 3): unit normal of each facet, from its first cell to its second."""
-        return self._cross_sections[0]
+        return self._cross_sections.normals
 
     @property
     def lengths(self) -> np.ndarray:
         """(f,): L = (P_j - P_i)·n of each facet [m]."""
-        return self._cross_sections[1]
+        return self._cross_sections.lengths
 
     @property
     def fluid_areas(self) -> np.ndarray:
         """(f,): A^f = A - Σ A^k of each facet [m²]."""
-        return self._cross_sections[2]
+        return self._cross_sections.fluid_areas
 
     @property
     def sectors(self) -> np.ndarray:
         """(f, 3): area A^k of each facet inside each of its vertices' spheres, 0 for walls [m²]."""
-        return self._cross_sections[3]
+        return self._cross_sections.sectors
 
     @property
     def covered(self) -> np.ndarray:
         """(f,) bool: facets covered by their spheres, all of which hold the facet's radical centre."""
-        return self._cross_sections[4]
+        return self._cross_sections.covered
 
     @property
     def areas(self) -> np.ndarray:
         """(f,): area A of each facet, solid and fluid [m²]."""
-        return self.fluid_areas + row_sums(self.sectors)
+        return self._cross_sections.areas
 
     @property
     def centroids(self) -> np.ndarray:
         """(f, 3): centroid of each facet, from the mesh's local origin [m]."""
-        mesh = self.mesh
-        return facet_centroids(self.vertices, mesh.n_spheres, mesh.local_points, mesh.sizes)
+        return facet_centroids(self.vertices, self.mesh.cell_vertices)
 
     # ---- the space between the two Laguerre vertices ----------------------------------------------------------------
 
     @cached_property
     def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
-        mesh = self.mesh
-        arrays = np.empty(len(self)), np.empty((len(self), 3))
-        facet_volumes(
-            self.cells, self.vertices, mesh.local_vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, *arrays
-        )
-        return arrays
+        volumes, surfaces = np.empty(len(self)), np.empty((len(self), 3))
+        facet_volumes(self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes, surfaces)
+        return volumes, surfaces
 
     @property
     def volumes(self) -> np.ndarray:

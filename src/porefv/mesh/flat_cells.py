@@ -11,8 +11,8 @@ _FLAT = 1e-9
 
 
 @njit(cache=True)
-def settle_flat_cells(cells, neighbours, points, n, vertices):
-    """Give each flat cell the Laguerre vertex of a neighbour, in place.
+def settle_flat_cells(cells, neighbours, vertices, laguerre_vertices):
+    """Give each flat cell the Laguerre vertex of a neighbour, in place in `laguerre_vertices` (m, 3).
 
     A square of spheres that rounding has bent is two pairs of triangles with a flat cell between them. Its vertex may
     lie anywhere on the line through the square's middle, by rounding alone; with a neighbour's, which lies there too,
@@ -21,7 +21,7 @@ def settle_flat_cells(cells, neighbours, points, n, vertices):
     flat = np.zeros(cells.shape[0], np.bool_)
     count = 0
     for t in range(cells.shape[0]):
-        flat[t] = _is_flat(cells[t], points, n)
+        flat[t] = _is_flat(cells[t], vertices)
         count += flat[t]
     while count > 0:
         settled = 0
@@ -36,13 +36,13 @@ def settle_flat_cells(cells, neighbours, points, n, vertices):
                     continue
                 square = 0.0
                 for axis in range(3):
-                    square += (vertices[u, axis] - vertices[t, axis]) ** 2
+                    square += (laguerre_vertices[u, axis] - laguerre_vertices[t, axis]) ** 2
                 if square < least:
                     least = square
                     best = u
             if best >= 0:
                 for axis in range(3):
-                    vertices[t, axis] = vertices[best, axis]
+                    laguerre_vertices[t, axis] = laguerre_vertices[best, axis]
                 flat[t] = False
                 settled += 1
         if settled == 0:
@@ -51,8 +51,9 @@ def settle_flat_cells(cells, neighbours, points, n, vertices):
 
 
 @njit(cache=True)
-def _is_flat(cell, points, n):
+def _is_flat(cell, vertices):
     """Whether the directions from a sphere of the cell to its other vertices lie in a plane, but for rounding."""
+    n, points, _ = vertices
     rows = np.empty((3, 3))
     first = -1
     for i in range(4):

@@ -2,35 +2,53 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, unit, vector_at, wall_distance
 from porefv.system.kernels import njit, prange
 
 
-@njit(cache=True, parallel=True)
-def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, centres):
-    """Radius and centre of the circle in each facet's plane tangent to its spheres and no-slip walls.
+class Circles(NamedTuple):
+    """A circle in the plane of each facet.
 
-    On walls with slip it is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that of the circle, its
-    tangency to the other two is linear in ρ and to the first quadratic. Radius zero where no such circle exists.
+    Attributes
+    ----------
+    radii : (f,) array
+        0 where there is no circle [m].
+    centres : (f, 3) array
+        From the local origin [m].
     """
+
+    radii: np.ndarray
+    centres: np.ndarray
+
+
+@njit(cache=True, parallel=True)
+def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
+    """Fill radii and centres of the circle in each facet's plane tangent to its spheres and no-slip walls (`Circles`).
+
+    On walls with slip, (6,) bool, a circle is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that
+    of the circle, its tangency to the other two is linear in ρ and to the first quadratic.
+    """
+    n, points, sizes = vertices
     for f in prange(facet_vertices.shape[0]):
         a = facet_vertices[f, 0]
         rows = np.empty((2, 2))
         constant = np.empty(2)
         slope = np.empty(2)
-        e1, e2 = _axes(f, facet_vertices, n, points)
+        e1, e2 = _axes(f, facet_vertices, vertices)
         for i in range(2):
             m = facet_vertices[f, i + 1]
-            w = towards(a, m, n, points)
+            w = towards(a, m, vertices)
             rows[i, 0] = dot(w, e1)
             rows[i, 1] = dot(w, e2)
             if m < n:
                 constant[i] = 0.5 * (dot(w, w) + (sizes[a] - sizes[m]) * (sizes[a] + sizes[m]))
                 slope[i] = sizes[a] - sizes[m]
             else:
-                constant[i] = wall_distance(a, m, points, sizes)
+                constant[i] = wall_distance(a, m, vertices)
                 slope[i] = 0.0 if slip[m - n] else -1.0
         radii[f] = 0.0
         det = rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0]
@@ -56,8 +74,10 @@ def inscribed_circles(facet_vertices, n, points, sizes, slip, radii, centres):
 
 
 @njit(cache=True, parallel=True)
-def circle_portions(facet_vertices, n, points, sizes, radii, centres, portions):
-    """Part of the area of a circle in each facet's plane that lies within the facet; 0 for a radius of zero."""
+def circle_portions(facet_vertices, vertices, circles, portions):
+    """Fill `portions` (f,) with the part of each circle's area that lies within the facet; 0 for a radius of zero."""
+    n = vertices.n_spheres
+    radii = circles.radii
     for f in prange(facet_vertices.shape[0]):
         portions[f] = 0.0
         if radii[f] <= 0.0:
@@ -65,22 +85,23 @@ def circle_portions(facet_vertices, n, points, sizes, radii, centres, portions):
         a = facet_vertices[f, 0]
         b = facet_vertices[f, 1]
         c = facet_vertices[f, 2]
-        e1, e2 = _axes(f, facet_vertices, n, points)
-        out = minus(vector_at(a, points), vector_at(f, centres))
+        e1, e2 = _axes(f, facet_vertices, vertices)
+        out = minus(vector_at(a, vertices.points), vector_at(f, circles.centres))
         # From the circle's centre to the facet's corners, in radii.
         corners = np.zeros((4, 2))
         sides = 3 if c < n else 4
         for i in range(sides):
             corner = out
             if i == 1 or (i == 2 and c >= n):
-                step = 1.0 if b < n else wall_distance(a, b, points, sizes)
-                corner = plus(corner, times(step, towards(a, b, n, points)))
+                step = 1.0 if b < n else wall_distance(a, b, vertices)
+                corner = plus(corner, times(step, towards(a, b, vertices)))
             if i == 2 and c >= n:
-                corner = plus(corner, times(wall_distance(b if b < n else a, c, points, sizes), vector_at(c, points)))
+                height = wall_distance(b if b < n else a, c, vertices)
+                corner = plus(corner, times(height, vector_at(c, vertices.points)))
             elif i == 2:
-                corner = plus(corner, towards(a, c, n, points))
+                corner = plus(corner, towards(a, c, vertices))
             elif i == 3:
-                corner = plus(corner, times(wall_distance(a, c, points, sizes), vector_at(c, points)))
+                corner = plus(corner, times(wall_distance(a, c, vertices), vector_at(c, vertices.points)))
             corners[i, 0] = dot(corner, e1) / radii[f]
             corners[i, 1] = dot(corner, e2) / radii[f]
         area = 0.0
@@ -100,11 +121,11 @@ def circle_portions(facet_vertices, n, points, sizes, radii, centres, portions):
 
 
 @njit(cache=True)
-def _axes(f, facet_vertices, n, points):
+def _axes(f, facet_vertices, vertices):
     """Two unit vectors in a facet's plane, at right angles in its sense."""
     a = facet_vertices[f, 0]
-    u = towards(a, facet_vertices[f, 1], n, points)
-    normal = cross_product(u, towards(a, facet_vertices[f, 2], n, points))
+    u = towards(a, facet_vertices[f, 1], vertices)
+    normal = cross_product(u, towards(a, facet_vertices[f, 2], vertices))
     return unit(u), unit(cross_product(normal, u))
 
 

@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.mesh.facet_kernels import facet_corners
+from porefv.mesh.facet_kernels import frame_of
 from porefv.mesh.vectors import cross_product, dot, minus, times, towards, unit, vector_at, wall_distance
 from porefv.system.kernels import njit
 
 
 @njit(cache=True)
-def crosses_laguerre_plane(k, m, u, n, points, sizes):
-    """Whether sphere k reaches beyond its Laguerre plane towards m."""
-    if m >= n:
-        return wall_distance(k, m, points, sizes) < sizes[k]
+def crosses_laguerre_plane(k, m, u, vertices):
+    """Whether sphere k reaches beyond its Laguerre plane towards vertex m, to which u leads."""
+    sizes = vertices.sizes
+    if m >= vertices.n_spheres:
+        return wall_distance(k, m, vertices) < sizes[k]
     return dot(u, u) < (sizes[k] + sizes[m]) * (sizes[k] + sizes[m])
 
 
 @njit(cache=True, error_model="numpy")
-def laguerre_plane_distances(k, m, u, n, points, sizes):
-    """Distances of centres k and m from the Laguerre plane between them, each within its radius.
+def laguerre_plane_distances(k, m, u, vertices):
+    """Distances of centres k and m from the Laguerre plane between them, each within its radius [m].
 
     u leads from k to m. Of a wall, the second distance has no meaning.
     """
+    sizes = vertices.sizes
     r = sizes[k]
-    if m >= n:
-        return min(max(wall_distance(k, m, points, sizes), -r), r), 0.0
+    if m >= vertices.n_spheres:
+        return min(max(wall_distance(k, m, vertices), -r), r), 0.0
     d, beyond = laguerre_feet(u, r, sizes[m])
     return min(max(d, -r), r), min(max(beyond, -sizes[m]), sizes[m])
 
@@ -40,32 +42,33 @@ def laguerre_feet(u, r, s):
 
 
 @njit(cache=True, error_model="numpy")
-def laguerre_volumes(facet_cells, facet_vertices, vertices, n, points, sizes):
-    """(n,): volume of the Laguerre cell of each sphere.
+def laguerre_volumes(facets, laguerre_vertices, vertices):
+    """(n,): volume of the Laguerre cell of each sphere [m³].
 
     The face between spheres k and m is a polygon with a corner P_i for each cell around the edge km. A facet with that
     edge owns the triangle from P_i to P_j and the face's foot, d from centre k, and a pyramid d h L / 6 under it: h is
     from the foot to the line of the P's, towards the facet's own side, and all are signed.
     """
+    n, points, sizes = vertices
     volumes = np.zeros(n)
-    for f in range(facet_cells.shape[0]):
-        a, b, c, ab, ac, cross, twice = facet_corners(f, facet_vertices, n, points)
+    for f in range(facets.cells.shape[0]):
+        a, b, c, _, _, cross, twice = frame_of(f, facets, vertices)
         if twice == 0.0:
             continue
-        pi = vector_at(facet_cells[f, 0], vertices)
-        length = dot(cross, minus(vector_at(facet_cells[f, 1], vertices), pi)) / twice
+        pi = vector_at(facets.cells[f, 0], laguerre_vertices)
+        length = dot(cross, minus(vector_at(facets.cells[f, 1], laguerre_vertices), pi)) / twice
         for side in range(3):
             k = a if side != 1 else b
             m = b if side == 0 else c
             if k >= n:
                 continue
             # Along the edge from k to m, in the facet's cyclic sense and unit.
-            u = towards(k, m, n, points)
+            u = towards(k, m, vertices)
             edge = unit(u)
             inward = cross_product(cross, edge if side != 2 else times(-1.0, edge))
             h = dot(inward, minus(pi, vector_at(k, points))) / twice
             if m >= n:
-                volumes[k] += wall_distance(k, m, points, sizes) * h * length / 6.0
+                volumes[k] += wall_distance(k, m, vertices) * h * length / 6.0
                 continue
             d, beyond = laguerre_feet(u, sizes[k], sizes[m])
             volumes[k] += d * h * length / 6.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,19 @@ if TYPE_CHECKING:
 
 # Laguerre vertices this close, relative to the smallest sphere of the facet between them, coincide but for rounding.
 TIE_TOLERANCE = 1e-9
+
+
+class PoreCells(NamedTuple):
+    """The cells of each pore: pore i has the entries starts[i] ... starts[i + 1] - 1 of `cells`.
+
+    Attributes
+    ----------
+    cells : (m,) int array
+    starts : (n_pores + 1,) int array
+    """
+
+    cells: np.ndarray
+    starts: np.ndarray
 
 
 class PoreMesh(CellMesh):
@@ -60,7 +73,7 @@ class PoreMesh(CellMesh):
     @cached_property
     def _united(self) -> tuple[np.ndarray, np.ndarray]:
         exact, asked = (
-            unite(self.facets.cells, self.facets.vertices, self.local_vertices, self.n_spheres, self.sizes, tolerance)
+            unite(self.facets.topology, self.local_vertices, self.cell_vertices, tolerance)
             for tolerance in (TIE_TOLERANCE, max(self.unite_tolerance, TIE_TOLERANCE))
         )
         return exact, asked
@@ -80,10 +93,10 @@ class PoreMesh(CellMesh):
         return int(self.cell_pore.max()) + 1
 
     @cached_property
-    def cells_of_pores(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cells in the order of their pores (m,), and where those of each pore begin (n_pores + 1,)."""
+    def cells_of_pores(self) -> PoreCells:
+        """The cells of each pore."""
         order = np.argsort(self.cell_pore, kind="stable")
-        return order, np.searchsorted(self.cell_pore[order], np.arange(self.n_pores + 1))
+        return PoreCells(order, np.searchsorted(self.cell_pore[order], np.arange(self.n_pores + 1)))
 
     @property
     def n_united(self) -> int:

@@ -5,18 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from porefv.mesh.facet_kernels import row_sums
-from porefv.mesh.inscribed_circles import circle_portions, inscribed_circles
+from porefv.mesh.inscribed_circles import Circles, circle_portions, inscribed_circles
 from porefv.mesh.uniting import tied_facets
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
 
 Derived = TypeVar("Derived")
+
+
+class ThroatFacets(NamedTuple):
+    """The facets of each throat: throat t has the entries starts[t] ... starts[t + 1] - 1 of `facets`.
+
+    Attributes
+    ----------
+    facets : (k,) int array
+        The first facet of each throat comes first.
+    starts : (t + 1,) int array
+    """
+
+    facets: np.ndarray
+    starts: np.ndarray
 
 
 class Throats:
@@ -80,13 +94,13 @@ class Throats:
         return throat
 
     @cached_property
-    def facets_of_throats(self) -> tuple[np.ndarray, np.ndarray]:
-        """Facets in the order of their throats, each's first one first, and where those of each start (t + 1,)."""
+    def facets_of_throats(self) -> ThroatFacets:
+        """The facets of each throat."""
         further, first, _ = self._further
         facets = np.concatenate([self.first_facets, further])
         throat = np.concatenate([np.arange(len(self)), self.facet_throat[first]])
         order = np.argsort(throat, kind="stable")
-        return facets[order], np.searchsorted(throat[order], np.arange(len(self) + 1))
+        return ThroatFacets(facets[order], np.searchsorted(throat[order], np.arange(len(self) + 1)))
 
     def _total(self, values: np.ndarray) -> np.ndarray:
         """(t,): sum of facet values (f,) over each throat."""
@@ -200,10 +214,8 @@ class Throats:
             radii[tied], centres[tied] = found[order][first], places[order][first]
         portions = np.zeros(len(mesh.facets.vertices))
         of_throat = self.facet_throat  # -1, the row appended below, within a pore
-        circle_portions(
-            mesh.facets.vertices, mesh.n_spheres, mesh.local_points, mesh.sizes,
-            np.append(radii, 0.0)[of_throat], np.append(centres, np.zeros((1, 3)), axis=0)[of_throat], portions,
-        )  # fmt: skip
+        circles = Circles(np.append(radii, 0.0)[of_throat], np.append(centres, np.zeros((1, 3)), axis=0)[of_throat])
+        circle_portions(mesh.facets.vertices, mesh.cell_vertices, circles, portions)
         whole = 1.0 / self.mirror_images(slip)
         portions = np.where(radii > 0.0, np.clip(self._total(portions), 0.05 * whole, whole), whole)
         return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
@@ -221,10 +233,9 @@ class Throats:
             np.divide(radii, np.sqrt(areas / (np.pi * portions)), out=np.ones(len(self)), where=known), 1.0
         )
 
-    def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mesh = self.mesh
-        found = np.empty(len(vertices)), np.zeros((len(vertices), 3))
-        inscribed_circles(vertices, mesh.n_spheres, mesh.local_points, mesh.sizes, slip, *found)
+    def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> Circles:
+        found = Circles(np.empty(len(vertices)), np.zeros((len(vertices), 3)))
+        inscribed_circles(vertices, self.mesh.cell_vertices, slip, *found)
         return found
 
     @cached_property

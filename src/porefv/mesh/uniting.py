@@ -10,22 +10,25 @@ from porefv.system.union_find import join
 
 
 @njit(cache=True)
-def unite(facet_cells, facet_vertices, vertices, n, sizes, tolerance):
-    """Label of each cell, equal across facets whose Laguerre vertices are within `tolerance` of the smallest radius.
+def unite(facets, laguerre_vertices, vertices, tolerance):
+    """(m,): label of each cell, equal across facets whose Laguerre vertices nearly coincide.
+
+    They are no further apart than `tolerance` times the smallest radius of the facet's spheres.
 
     Labels follow the order of the cells.
     """
-    parent = np.arange(vertices.shape[0], dtype=np.int32)
-    for f in range(facet_cells.shape[0]):
-        i = facet_cells[f, 0]
-        j = facet_cells[f, 1]
+    parent = np.arange(laguerre_vertices.shape[0], dtype=np.int32)
+    for f in range(facets.cells.shape[0]):
+        i = facets.cells[f, 0]
+        j = facets.cells[f, 1]
         square = 0.0
         for axis in range(3):
-            square += (vertices[i, axis] - vertices[j, axis]) ** 2
+            square += (laguerre_vertices[i, axis] - laguerre_vertices[j, axis]) ** 2
         radius = np.inf
         for v in range(3):
-            if facet_vertices[f, v] < n:
-                radius = min(radius, sizes[facet_vertices[f, v]])
+            k = facets.vertices[f, v]
+            if k < vertices.n_spheres:
+                radius = min(radius, vertices.sizes[k])
         if square <= (tolerance * radius) ** 2:
             join(parent, i, j)
     count = 0

@@ -1,7 +1,4 @@
-"""Vectors of three numbers as tuples, and vectors between the vertices of cells: spheres (k < n) and walls (n + w).
-
-`points` and `sizes` are `CellMesh.local_points` and `CellMesh.sizes`.
-"""
+"""Vectors of three numbers as tuples, and vectors and distances between the vertices of cells (`Vertices`)."""
 
 from __future__ import annotations
 
@@ -47,16 +44,18 @@ def vector_at(i, array):
 
 
 @njit(cache=True)
-def towards(k, m, n, points):
+def towards(k, m, vertices):
     """From sphere k to vertex m: the vector between centres, or the outward direction of a wall."""
-    if m < n:
+    points = vertices.points
+    if m < vertices.n_spheres:
         return points[m, 0] - points[k, 0], points[m, 1] - points[k, 1], points[m, 2] - points[k, 2]
     return points[m, 0], points[m, 1], points[m, 2]
 
 
 @njit(cache=True)
-def wall_distance(k, wall, points, sizes):
+def wall_distance(k, wall, vertices):
     """Distance from the centre of sphere k to a wall."""
-    return sizes[wall] - (
+    points = vertices.points
+    return vertices.sizes[wall] - (
         points[wall, 0] * points[k, 0] + points[wall, 1] * points[k, 1] + points[wall, 2] * points[k, 2]
     )

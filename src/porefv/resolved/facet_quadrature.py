@@ -139,7 +139,7 @@ def _planes(mesh: PoreMesh) -> np.ndarray:
     normals = mesh.facets.normals
     for f, (first, second) in enumerate(mesh.facets.cells):
         a, b, c = mesh.facets.vertices[f]
-        offset = normals[f] @ np.array(centroid(a, b, c, mesh.n_spheres, mesh.local_points, mesh.sizes))
+        offset = normals[f] @ np.array(centroid(a, b, c, mesh.cell_vertices))
         for cell, sense in ((first, 1.0), (second, -1.0)):
             planes[cell, count[cell], :3] = sense * normals[f]
             planes[cell, count[cell], 3] = sense * offset

@@ -10,7 +10,8 @@ Sums run over blocks of fixed size, so that results do not depend on the number 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -177,7 +178,7 @@ class _ImbalanceRule:
         return lost <= self._target
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Refined:
     """Pressures as sums of two doubles, and how exact they are.
 
@@ -208,7 +209,10 @@ def refined(
     tolerance: float,
     accuracy: float,
 ) -> Refined:
-    """Iterate until Σ|b - A x| is below `tolerance` times the flow and the error of pressures below `accuracy`.
+    """Correct pressures until Σ|b - A x| is below `tolerance` times the flow and their error below `accuracy`.
+
+    A correction reduces the residual of the pressures found before it: down to the tolerance as long as that is not
+    reached and every correction halves the least imbalance; else as far as one residual allows.
 
     Parameters
     ----------
@@ -225,57 +229,99 @@ def refined(
     Returns
     -------
     Refined
-        Its best, whether or not it meets both.
+        The pressures of the least imbalance, whether or not they meet both.
     """
     with threads_for(len(network)):
-        x, rest = np.zeros((2, len(network)))
-        total, rounds, halved, best = 0, 0, 0, None
-        while True:
-            r = network.split_residual(held, sources, x, rest)
-            flow = 0.5 * float(np.abs(network.leaks * ((held - x) - rest)).sum() + np.abs(sources).sum())
-            lost = float(np.abs(r).sum())
-            error = np.inf
-            if lost <= tolerance * flow:
-                error = _largest_error(preconditioner, r)
-            rounds += 1
-            if best is None or lost < 0.5 * best.lost:
-                halved = rounds
-            if best is None or lost < best.lost:
-                best = Refined(x, rest, total, lost, flow, error)
-            stalled = rounds - halved >= _PATIENCE
-            if (lost <= tolerance * flow and error <= accuracy) or stalled or total >= MAX_ITERATIONS:
+        found = best = _Approximation(_Equation(network, held, sources, preconditioner), *np.zeros((2, len(network))))
+        iterations = 0
+        futile = 0  # corrections, one after another, that have not halved the least imbalance
+        while not (found.conserves(tolerance) and found.error <= accuracy):
+            if futile >= _PATIENCE or iterations >= MAX_ITERATIONS:
                 break
-            hasty = error == np.inf and halved == rounds  # else as far as one residual reaches
-            correction, iterations = _correction(
-                network, held, sources, x, rest, r, preconditioner, tolerance if hasty else 0.0
-            )
-            total += iterations
-            rest = rest + correction
-            larger = x + rest  # the sum of both, and exactly what rounding it leaves
-            part = larger - x
-            x, rest = larger, (x - (larger - part)) + (rest - part)
-        if best.error == np.inf:
-            r = network.split_residual(held, sources, best.x, best.rest)
-            best = replace(best, error=_largest_error(preconditioner, r))
-        return replace(best, iterations=total)
+            to_tolerance = futile == 0 and not found.conserves(tolerance)
+            found, count = found.corrected(tolerance if to_tolerance else 0.0)
+            iterations += count
+            futile = 0 if found.lost < 0.5 * best.lost else futile + 1
+            if found.lost < best.lost:
+                best = found
+        return Refined(best.x, best.rest, iterations, best.lost, best.flow, best.error)
 
 
-def _largest_error(preconditioner: Preconditioner, r: np.ndarray) -> float:
-    z, room = np.empty((2, len(r)))
-    preconditioner.apply(np.abs(r), z, room)
-    return float(np.abs(z).max(initial=0.0))
+@dataclass(frozen=True, eq=False)
+class _Equation:
+    """A x = b, b = leaks held + sources; attributes are parameters of `refined`."""
+
+    network: Network
+    held: np.ndarray
+    sources: np.ndarray
+    preconditioner: Preconditioner
+
+    def flow(self, x: np.ndarray, rest: np.ndarray) -> float:
+        """Half of all that enters or leaves with the pressures x + rest [m³/s]."""
+        entering = self.network.leaks * ((self.held - x) - rest)
+        return 0.5 * float(np.abs(entering).sum() + np.abs(self.sources).sum())
 
 
-def _correction(a, held, sources, x, rest, r, preconditioner, tolerance):
-    """What to add to the pressures, from their residual r: to the tolerance, or as far as one residual reaches."""
-    d = np.zeros(len(a))
+@dataclass(frozen=True, eq=False)
+class _Approximation:
+    """Pressures x + rest as the solution of an equation."""
 
-    def enough():
-        flow = 0.5 * float(np.abs(a.leaks * ((held - x) - (rest + d))).sum() + np.abs(sources).sum())
-        return 0.5 * tolerance * flow
+    equation: _Equation
+    x: np.ndarray
+    rest: np.ndarray
 
-    rule = _ImbalanceRule(_REACH * float(np.abs(r).sum()), enough)
-    return d, preconditioned_cg(a, preconditioner, d, r.copy(), rule, MAX_ITERATIONS)[0]
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """(n,): b - A (x + rest) [m³/s]."""
+        equation = self.equation
+        return equation.network.split_residual(equation.held, equation.sources, self.x, self.rest)
+
+    @cached_property
+    def lost(self) -> float:
+        """Σ|b - A (x + rest)| [m³/s]."""
+        return float(np.abs(self.residual).sum())
+
+    @cached_property
+    def flow(self) -> float:
+        """Half of all that enters or leaves [m³/s]."""
+        return self.equation.flow(self.x, self.rest)
+
+    @cached_property
+    def error(self) -> float:
+        """Estimate of the largest error of a pressure: what A⁻¹ makes of |b - A (x + rest)| [Pa]."""
+        z, room = np.empty((2, len(self.x)))
+        self.equation.preconditioner.apply(np.abs(self.residual), z, room)
+        return float(np.abs(z).max(initial=0.0))
+
+    def conserves(self, tolerance: float) -> bool:
+        """Whether no more than this part of the flow is lost."""
+        return self.lost <= tolerance * self.flow
+
+    def corrected(self, tolerance: float) -> tuple[_Approximation, int]:
+        """A better approximation, which loses this part of the flow or the least that one residual allows.
+
+        Returns
+        -------
+        approximation, number of iterations
+        """
+        network, x, rest = self.equation.network, self.x, self.rest
+        correction = np.zeros(len(network))
+
+        def enough() -> float:
+            return 0.5 * tolerance * self.equation.flow(x, rest + correction)
+
+        rule = _ImbalanceRule(_REACH * self.lost, enough)
+        iterations, *_ = preconditioned_cg(
+            network, self.equation.preconditioner, correction, self.residual.copy(), rule, MAX_ITERATIONS
+        )
+        return _Approximation(self.equation, *_two_sum(x, rest + correction)), iterations
+
+
+def _two_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The sums a + b, and exactly what rounding leaves of them (Knuth)."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
 
 
 @njit(cache=True, parallel=True)

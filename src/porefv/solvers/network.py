@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,27 @@ if TYPE_CHECKING:
 
 # Sums run over blocks of so many nodes, so that they do not depend on the number of threads.
 BLOCK = 16384
+
+
+class NetworkRows(NamedTuple):
+    """A network as kernels take it, row by row: (A x)_i = e_i x_i + Σ_j w_ij (x_i - x_j).
+
+    Attributes
+    ----------
+    starts : (n + 1,) int64 array
+        Row i has the entries starts[i] ... starts[i + 1] - 1 of `columns` and `links`.
+    columns : (e,) int32 array
+        Node j at the other end of each link.
+    links : (e,) array
+        Weight w_ij of each link [m³/(Pa s)].
+    leaks : (n,) array
+        Weight e_i of each node's links to nodes outside [m³/(Pa s)].
+    """
+
+    starts: np.ndarray
+    columns: np.ndarray
+    links: np.ndarray
+    leaks: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +86,25 @@ class Network:
     def __len__(self) -> int:
         return len(self.leaks)
 
+    @property
+    def rows(self) -> NetworkRows:
+        """The network as kernels take it."""
+        return NetworkRows(self.starts, self.columns, self.links, self.leaks)
+
     def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
         """aq = A q, from differences of q; returns q·aq."""
-        return _multiply(self.starts, self.columns, self.links, self.leaks, q, aq)
+        return _multiply(self.rows, q, aq)
 
     def residual(self, rhs: np.ndarray, x: np.ndarray) -> np.ndarray:
         """b - A x, from differences of x: the imbalance of each node."""
         out = np.empty(len(self))
-        residual(self.starts, self.columns, self.links, self.leaks, rhs, x, out)
+        residual(self.rows, rhs, x, out)
         return out
 
     def split_residual(self, held: np.ndarray, sources: np.ndarray, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
         """b - A (x + rest), b = leaks held + sources: from differences of both parts of the pressures."""
         out = np.empty(len(self))
-        split_residual(self.starts, self.columns, self.links, self.leaks, held, sources, x, rest, out)
+        split_residual(self.rows, held, sources, x, rest, out)
         return out
 
     def to_matrix(self) -> sparse.csr_array:
@@ -121,8 +147,9 @@ def _fill(pairs, weights, number, place, columns, links, diagonal):
 
 
 @njit(cache=True, parallel=True)
-def _multiply(starts, columns, links, leaks, q, aq):
+def _multiply(network, q, aq):
     """aq = A q; returns q·aq."""
+    starts, columns, links, leaks = network
     n = q.shape[0]
     parts = np.zeros((n + BLOCK - 1) // BLOCK)
     for block in prange(parts.shape[0]):
@@ -138,8 +165,9 @@ def _multiply(starts, columns, links, leaks, q, aq):
 
 
 @njit(cache=True, parallel=True)
-def residual(starts, columns, links, leaks, rhs, x, out):
+def residual(network, rhs, x, out):
     """out = b - A x."""
+    starts, columns, links, leaks = network
     for i in prange(leaks.shape[0]):
         s = rhs[i] - leaks[i] * x[i]
         for k in range(starts[i], starts[i + 1]):
@@ -148,8 +176,9 @@ def residual(starts, columns, links, leaks, rhs, x, out):
 
 
 @njit(cache=True, parallel=True)
-def split_residual(starts, columns, links, leaks, held, sources, x, rest, out):
+def split_residual(network, held, sources, x, rest, out):
     """out = leaks held + sources - A (x + rest)."""
+    starts, columns, links, leaks = network
     for i in prange(leaks.shape[0]):
         s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
         for k in range(starts[i], starts[i + 1]):

@@ -7,9 +7,11 @@ the facet. So the section opens as those of a hyperboloid do, whatever the sizes
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from porefv.mesh.facet_kernels import facet_angles, facet_corners
+from porefv.mesh.facet_kernels import facet_angles, frame_of
 from porefv.mesh.vectors import dot, minus, vector_at, wall_distance
 from porefv.system.kernels import njit, prange
 
@@ -26,63 +28,165 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
+class Ends(NamedTuple):
+    """Where throats may end: two points of each cell, from the local origin.
+
+    Attributes
+    ----------
+    laguerre_vertices, centres : (m, 3) arrays
+        The cell's Laguerre vertex, and the centre of its pore [m].
+    """
+
+    laguerre_vertices: np.ndarray
+    centres: np.ndarray
+
+
+class Necks(NamedTuple):
+    """The constriction of each throat, in the plane of its facets.
+
+    Attributes
+    ----------
+    lengths : (t,) array
+        L of each throat [m].
+    areas : (t,) array
+        Fluid area A^f of its constriction [m²].
+    roundness : (t,) array
+        λ [-].
+    portions : (t,) array
+        χ, the part of the inscribed circle that lies within the throat [-].
+    """
+
+    lengths: np.ndarray
+    areas: np.ndarray
+    roundness: np.ndarray
+    portions: np.ndarray
+
+
+class Coefficients(NamedTuple):
+    """Fitted coefficients of the friction: c₁ and c₂ of `SectionFriction` [-]."""
+
+    friction: float
+    curvature: float
+
+
+class Sections(NamedTuple):
+    """What all cross-sections of a throat have in common.
+
+    Attributes
+    ----------
+    neck : float
+        Fluid area A^f in the plane of the throat's facets [m²].
+    on_walls : float
+        Length of the perimeter on no-slip walls [m].
+    radii, angles : (v,) arrays
+        Radius of the sphere at each vertex of the facets and its angle θ there, 0 for walls [m, -].
+    widest : float
+        The largest radius [m].
+    mean_radius : float
+        Mean of ∛r² weighed by the angles, to the power of 3/2 [m].
+    doubling_height : float
+        Height at which Σ θ s² / 2 is the area of the neck [m].
+    opening_factor : float
+        λ^{3/2} [-].
+    portion : float
+        χ [-].
+    """
+
+    neck: float
+    on_walls: float
+    radii: np.ndarray
+    angles: np.ndarray
+    widest: float
+    mean_radius: float
+    doubling_height: float
+    opening_factor: float
+    portion: float
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
-def section_friction(
-    which, facets, starts, facet_vertices, facet_cells, n, points, sizes, vertices, centres, normals, lengths, areas,
-    roundness, portions, slip, c1, c2, conductivity, beyond,
-):  # fmt: skip
-    """Length over friction of each throat, 0 without a fluid area, and the parts of its friction beyond vertices."""
+def section_friction(which, throats, facets, vertices, ends, necks, slip, coefficients):
+    """Length over friction of some throats, and the parts of their friction beyond the Laguerre vertices.
+
+    Parameters
+    ----------
+    which : (u,) int array
+        The throats.
+    throats : ThroatFacets
+    facets : FacetPlanes
+    vertices : Vertices
+    ends : Ends
+    necks : Necks
+    slip : (6,) bool array
+        Walls of symmetry.
+    coefficients : Coefficients
+
+    Returns
+    -------
+    conductivity : (u,) array
+        0 without a fluid area [m⁴].
+    beyond : (u, 2) array
+        Part between the Laguerre vertex and the centre of the first pore, and of the second [-].
+    """
+    conductivity = np.zeros(which.shape[0])
+    beyond = np.zeros((which.shape[0], 2))
     for row in prange(which.shape[0]):
         t = which[row]
-        conductivity[row] = 0.0
-        beyond[row] = 0.0
-        if areas[t] <= 0.0:
+        if necks.areas[t] <= 0.0:
             continue
-        f = facets[starts[t]]
-        count = starts[t + 1] - starts[t]
+        start = throats.starts[t]
+        count = throats.starts[t + 1] - start
         radii = np.zeros(3 * count)
         angles = np.zeros(3 * count)
-        wall = 0.0
+        on_walls = 0.0
         for i in range(count):
-            wall += _discs(
-                facets[starts[t] + i], facet_vertices, n, points, sizes, slip,
-                radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3],
-            )  # fmt: skip
-        turn = angles.sum()
+            f = throats.facets[start + i]
+            on_walls += _discs(f, facets, vertices, slip, radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3])
         widest = radii.max()
-        radius = 0.0
+        total_angle = angles.sum()
+        mean = 0.0
         for v in range(radii.shape[0]):
             if radii[v] > 0.0:
-                radius += angles[v] * np.cbrt(radii[v] / widest) ** 2
-        radius = widest * np.sqrt(radius / turn) ** 3
-        shape = areas[t], wall, radii, angles, portions[t], roundness[t] ** 1.5, radius, c1, c2
-        neck = np.sqrt(2.0 * areas[t] / turn)
-        begin, end = _span(f, facet_cells, facet_vertices, points, centres, normals, lengths[t])
-        first, last = _span(f, facet_cells, facet_vertices, points, vertices, normals, lengths[t])
+                mean += angles[v] * np.cbrt(radii[v] / widest) ** 2
+        sections = Sections(
+            neck=necks.areas[t],
+            on_walls=on_walls,
+            radii=radii,
+            angles=angles,
+            widest=widest,
+            mean_radius=widest * np.sqrt(mean / total_angle) ** 3,
+            doubling_height=np.sqrt(2.0 * necks.areas[t] / total_angle),
+            opening_factor=necks.roundness[t] ** 1.5,
+            portion=necks.portions[t],
+        )
+        f = throats.facets[start]
+        begin, end = _span(f, facets, vertices, ends.centres, necks.lengths[t])
+        first, last = _span(f, facets, vertices, ends.laguerre_vertices, necks.lengths[t])
         if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
-            conductivity[row] = 1.0 / _friction(abs(end), abs(end), shape)
+            conductivity[row] = 1.0 / _friction(abs(end), abs(end), sections, coefficients)
             continue
         total = 0.0
         if begin < 0.0:
-            total += _between(max(-end, 0.0), -begin, widest, neck, shape)
+            total += _between(max(-end, 0.0), -begin, sections, coefficients)
         if end > 0.0:
-            total += _between(max(begin, 0.0), end, widest, neck, shape)
-        conductivity[row] = STRETCH * lengths[t] / total
+            total += _between(max(begin, 0.0), end, sections, coefficients)
+        conductivity[row] = STRETCH * necks.lengths[t] / total
         if -begin > max(-first, -end, 0.0):
-            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, widest, neck, shape) / total
+            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, sections, coefficients) / total
         if end > max(last, begin, 0.0):
-            beyond[row, 1] = _between(max(last, begin, 0.0), end, widest, neck, shape) / total
+            beyond[row, 1] = _between(max(last, begin, 0.0), end, sections, coefficients) / total
+    return conductivity, beyond
 
 
 @njit(cache=True)
-def _span(f, facet_cells, facet_vertices, points, ends, normals, length):
-    """Heights over facet f, times √½, between which its throat extends: of the ends of its two pores.
+def _span(f, facets, vertices, points, length):
+    """Heights over facet f, times √½, between which its throat extends: those of two points (m, 3) of its cells.
 
     `LEAST_SPAN` of the throat's length is left to it.
     """
-    first = vector_at(facet_vertices[f, 0], points)
-    low = dot(minus(vector_at(facet_cells[f, 0], ends), first), vector_at(f, normals))
-    high = dot(minus(vector_at(facet_cells[f, 1], ends), first), vector_at(f, normals))
+    origin = vector_at(facets.vertices[f, 0], vertices.points)
+    normal = vector_at(f, facets.normals)
+    low = dot(minus(vector_at(facets.cells[f, 0], points), origin), normal)
+    high = dot(minus(vector_at(facets.cells[f, 1], points), origin), normal)
     least = LEAST_SPAN * length
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
@@ -90,45 +194,52 @@ def _span(f, facet_cells, facet_vertices, points, ends, normals, length):
 
 
 @njit(cache=True)
-def _discs(f, facet_vertices, n, points, sizes, slip, radii, angles):
-    """Radii of the spheres of facet f and its angles there; returns the length of its edges on no-slip walls."""
-    a, b, c, ab, ac, _, twice = facet_corners(f, facet_vertices, n, points)
-    angles[0], angles[1], angles[2] = facet_angles(b, c, n, ab, ac, twice)
-    radii[0] = sizes[a]
-    if b < n:
-        radii[1] = sizes[b]
-    if c < n:
-        radii[2] = sizes[c]
-        return 0.0
-    on_c = 0.0 if slip[c - n] else (twice if b < n else wall_distance(a, b, points, sizes))
-    on_b = 0.0 if b < n or slip[b - n] else wall_distance(a, c, points, sizes)
-    return on_b + on_c
+def _discs(f, facets, vertices, slip, radii, angles):
+    """Fill radii (3,) and angles (3,) of the spheres of facet f; returns the length of its edges on no-slip walls."""
+    n = vertices.n_spheres
+    frame = frame_of(f, facets, vertices)
+    angles[0], angles[1], angles[2] = facet_angles(frame, n)
+    radii[0] = vertices.sizes[frame.a]
+    if frame.b < n:
+        radii[1] = vertices.sizes[frame.b]
+    if frame.c < n:
+        radii[2] = vertices.sizes[frame.c]
+    on_walls = 0.0
+    if frame.b >= n and not slip[frame.b - n]:
+        on_walls += wall_distance(frame.a, frame.c, vertices)
+    if frame.c >= n and not slip[frame.c - n]:
+        on_walls += frame.twice if frame.b < n else wall_distance(frame.a, frame.b, vertices)
+    return on_walls
 
 
 @njit(cache=True, error_model="numpy")
-def _friction(s, reach, shape):
+def _friction(s, reach, sections, coefficients):
     """Resistance of a unit of length at height s over the neck, on the way to a pore's centre at height `reach`."""
-    neck, perimeter, radii, angles, portion, roundness, radius, c1, c2 = shape
     growth = 0.0
-    for v in range(radii.shape[0]):
-        r = radii[v]
+    perimeter = sections.on_walls
+    for v in range(sections.radii.shape[0]):
+        r = sections.radii[v]
+        angle = sections.angles[v]
         least = LEAST_DISC * r
         if s > r:
             least *= (r / s) ** 2
-        growth += 0.5 * angles[v] * min(s, r) ** 2
-        perimeter += angles[v] * np.sqrt(max((r - s) * (r + s), least**2))
-    area = neck + (1.0 - NARROWING * s / reach) * growth if reach > 0.0 else neck
-    opening = roundness * max(np.sqrt(area / (np.pi * portion)), 2.0 * area / perimeter)
-    return (c1 * perimeter + 2.0 * c2 * area / radius) / (area * area * opening)
+        growth += 0.5 * angle * min(s, r) ** 2
+        perimeter += angle * np.sqrt(max((r - s) * (r + s), least**2))
+    area = sections.neck + (1.0 - NARROWING * s / reach) * growth if reach > 0.0 else sections.neck
+    width = max(np.sqrt(area / (np.pi * sections.portion)), 2.0 * area / perimeter)
+    opening = sections.opening_factor * width
+    c1, c2 = coefficients
+    return (c1 * perimeter + 2.0 * c2 * area / sections.mean_radius) / (area * area * opening)
 
 
 @njit(cache=True, error_model="numpy")
-def _between(low, high, widest, neck, shape):
+def _between(low, high, sections, coefficients):
     """Friction between two heights, 0 <= low < high.
 
     From the neck to the poles of the widest sphere in t, s = r t (3 - t²) / 2, where the perimeter has no root, and
-    points are as dense as the neck, of the length given, asks for. Beyond in the logarithm of s.
+    points are as dense as the doubling height requires. Beyond in the logarithm of s.
     """
+    widest = sections.widest
     if abs(high - widest) < 1e-9 * widest:  # lattices: t has a root there, which makes much of rounding
         high = widest
     total = 0.0
@@ -137,10 +248,10 @@ def _between(low, high, widest, neck, shape):
         end = np.log(high / widest)
         for i in range(_NODES.shape[0]):
             s = widest * np.exp(begin + (end - begin) * _NODES[i])
-            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, shape)
+            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, sections, coefficients)
     if low >= widest:
         return total
-    e = neck / widest
+    e = sections.doubling_height / widest
     begin = 2.0 * np.sin(np.arcsin(low / widest) / 3.0)
     end = 2.0 * np.sin(np.arcsin(min(high / widest, 1.0)) / 3.0)
     # v = t / √(t² + e²), its differences and 1 - v without cancellation: far from a narrow neck v is nearly 1.
@@ -153,5 +264,6 @@ def _between(low, high, widest, neck, shape):
         root = np.sqrt((left - span * _NODES[i]) * (1.0 + v))
         t = e * v / root
         rate = 1.5 * widest * (1.0 - t * t) * e / root**3
-        total += span * _WEIGHTS[i] * rate * _friction(0.5 * widest * t * (3.0 - t * t), high, shape)
+        s = 0.5 * widest * t * (3.0 - t * t)
+        total += span * _WEIGHTS[i] * rate * _friction(s, high, sections, coefficients)
     return total

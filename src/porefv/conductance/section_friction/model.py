@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.conductance.model import ConductanceModel, DropBeyondVertices
-from porefv.conductance.section_friction.friction_kernels import section_friction
+from porefv.conductance.section_friction.friction_kernels import Coefficients, Ends, Necks, section_friction
 from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.errors import InputError
 from porefv.mesh.throats import Throats
@@ -62,12 +62,20 @@ class SectionFriction(ConductanceModel):
     def _friction(self, throats: Throats, slip: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of some throats (u,): conductivity (u,), and parts of the drop beyond the vertices (u, 2)."""
         mesh = throats.mesh
-        conductivity, beyond = np.empty(len(which)), np.empty((len(which), 2))
-        facets, starts = throats.facets_of_throats
-        section_friction(
-            which, facets, starts, mesh.facets.vertices, mesh.facets.cells, mesh.n_spheres, mesh.local_points,
-            mesh.sizes, mesh.local_vertices, throats.derived(centres_of_pores), mesh.facets.normals,
-            throats.effective_lengths, throats.fluid_areas, throats.roundness(slip), throats.inscribed_circles(slip)[1],
-            np.asarray(slip, bool), self.friction, self.curvature, conductivity, beyond,
-        )  # fmt: skip
-        return conductivity, beyond
+        ends = Ends(mesh.local_vertices, throats.derived(centres_of_pores))
+        necks = Necks(
+            throats.effective_lengths,
+            throats.fluid_areas,
+            throats.roundness(slip),
+            throats.inscribed_circles(slip)[1],
+        )
+        return section_friction(
+            which,
+            throats.facets_of_throats,
+            mesh.facets.planes,
+            mesh.cell_vertices,
+            ends,
+            necks,
+            np.asarray(slip, bool),
+            Coefficients(self.friction, self.curvature),
+        )

@@ -8,6 +8,8 @@ therefore the vertex moved towards the small sphere.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from porefv.mesh.throats import Throats
@@ -22,26 +24,46 @@ LEAST_HEIGHT = 0.5
 SHORT = 0.1
 
 
+class Pores(NamedTuple):
+    """Cells and pores.
+
+    Attributes
+    ----------
+    vertices : (m, 4) int32 array
+        Spheres and walls of each cell.
+    of_cells : (m,) int32 array
+        Pore of each cell.
+    cells, starts : (m,), (n_pores + 1,) int arrays
+        Pore i has the entries starts[i] ... starts[i + 1] - 1 of `cells`.
+    """
+
+    vertices: np.ndarray
+    of_cells: np.ndarray
+    cells: np.ndarray
+    starts: np.ndarray
+
+
 def centres_of_pores(throats: Throats) -> np.ndarray:
     """(m, 3): centre of each cell's pore, its Laguerre vertex moved to small spheres, from the local origin [m]."""
-    mesh, facets = throats.mesh, throats.mesh.facets
-    order, firsts = mesh.cells_of_pores
-    ordered, starts = throats.facets_of_throats
+    mesh = throats.mesh
+    pores = Pores(mesh.cells, mesh.cell_pore, *mesh.cells_of_pores)
     parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
     _shift_parts(
-        ordered, starts, facets.cells, facets.vertices, mesh.cells, order, firsts, mesh.cell_pore, mesh.n_spheres,
-        mesh.local_points, mesh.sizes, mesh.local_vertices, facets.normals, throats.effective_lengths, parts,
-    )  # fmt: skip
-    _pore_centres(mesh.cells, order, firsts, mesh.n_spheres, mesh.local_points, mesh.local_vertices, parts, centres)
+        throats.facets_of_throats,
+        throats.effective_lengths,
+        mesh.facets.planes,
+        pores,
+        mesh.cell_vertices,
+        mesh.local_vertices,
+        parts,
+    )
+    _pore_centres(pores, mesh.cell_vertices, mesh.local_vertices, parts, centres)
     return centres
 
 
 @njit(cache=True)
-def _shift_parts(
-    facets, starts, facet_cells, facet_vertices, cells, order, firsts, pores, n, points, sizes, vertices, normals,
-    lengths, parts,
-):  # fmt: skip
-    """Parts (m, 4) of the distance from a pore's vertex to each sphere of its cells by which the centre moves there.
+def _shift_parts(throats, lengths, facets, pores, vertices, laguerre_vertices, parts):
+    """Fill `parts`: by which part of the distance from a pore's vertex to a sphere of its cells the centre moves there.
 
     A throat demands that the height of the centre over the throat's plane is at least (1 - r / r_n) / 2 of the height H
     of the sphere of radius r; r_n is the smallest radius of the throat. This is one half for very small spheres, and
@@ -51,31 +73,37 @@ def _shift_parts(
 
     Parameters
     ----------
-    facets, starts : arrays
-        Of `Throats.facets_of_throats`.
+    throats : ThroatFacets
     lengths : (t,) array
-        Of throats.
-    order, firsts : (m,), (n_pores + 1,) arrays
-        Cells in the order of their pores, and where those of each pore begin.
+        Of throats [m].
+    facets : FacetPlanes
+    pores : Pores
+    vertices : Vertices
+    laguerre_vertices : (m, 3) array
+        Of the cells [m].
+    parts : (m, 4) array
+        Part for each vertex of each cell, zero before [-].
     """
+    n, points, sizes = vertices
+    starts = throats.starts
     for t in range(starts.shape[0] - 1):
-        f = facets[starts[t]]
-        first = vector_at(facet_vertices[f, 0], points)
-        normal = vector_at(f, normals)
+        f = throats.facets[starts[t]]
+        first = vector_at(facets.vertices[f, 0], points)
+        normal = vector_at(f, facets.normals)
         least = np.inf
         for j in range(starts[t], starts[t + 1]):
             for v in range(3):
-                k = facet_vertices[facets[j], v]
+                k = facets.vertices[throats.facets[j], v]
                 if k < n:
                     least = min(least, sizes[k])
         demand = min(lengths[t] / (SHORT * least), 1.0)
         for side in range(2):
             inward = 1.0 if side == 1 else -1.0
-            height = inward * dot(minus(vector_at(facet_cells[f, side], vertices), first), normal)
-            pore = pores[facet_cells[f, side]]
-            for c in order[firsts[pore] : firsts[pore + 1]]:
+            height = inward * dot(minus(vector_at(facets.cells[f, side], laguerre_vertices), first), normal)
+            pore = pores.of_cells[facets.cells[f, side]]
+            for c in pores.cells[pores.starts[pore] : pores.starts[pore + 1]]:
                 for i in range(4):
-                    k = cells[c, i]
+                    k = pores.vertices[c, i]
                     if k >= n or sizes[k] >= least:
                         continue
                     above = inward * dot(minus(vector_at(k, points), first), normal)
@@ -86,39 +114,41 @@ def _shift_parts(
 
 
 @njit(cache=True, parallel=True)
-def _pore_centres(cells, order, firsts, n, points, vertices, parts, centres):
-    """Centre (m, 3) of each cell's pore, moved from the cell's own vertex.
+def _pore_centres(pores, vertices, laguerre_vertices, parts, centres):
+    """Fill the centres (m, 3) of each cell's pore, moved from the cell's own vertex.
 
     Where several spheres move the centre, the moves are averaged with the parts as weights. The centre of a pore on a
     wall stays on that wall: the mirror image of the sphere moves it by as much in the other sense.
     """
-    for pore in prange(firsts.shape[0] - 1):
-        members = order[firsts[pore] : firsts[pore + 1]]
+    n, points, _ = vertices
+    for pore in prange(pores.starts.shape[0] - 1):
+        members = pores.cells[pores.starts[pore] : pores.starts[pore + 1]]
         free = np.ones(3)
         total = 0.0
         weight = 0.0
         x = np.zeros(3)
         for a in range(members.shape[0]):
             for i in range(4):
-                k = cells[members[a], i]
+                k = pores.vertices[members[a], i]
                 part = parts[members[a], i]
                 if k >= n:
                     free[WALL_AXES[k - n]] = 0.0
-                elif part > 0.0 and not _seen(k, cells, members[:a]):
+                elif part > 0.0 and not _seen(k, pores.vertices, members[:a]):
                     total += part
                     weight += part * part
                     for axis in range(3):
                         x[axis] += part * part * points[k, axis]
         for c in members:
             for axis in range(3):
-                v = vertices[c, axis]
+                v = laguerre_vertices[c, axis]
                 centres[c, axis] = v + free[axis] * (x[axis] - weight * v) / total if total > 0.0 else v
 
 
 @njit(cache=True)
-def _seen(k, cells, members):
+def _seen(k, cell_vertices, members):
+    """Whether one of the cells has vertex k."""
     for c in members:
         for i in range(4):
-            if cells[c, i] == k:
+            if cell_vertices[c, i] == k:
                 return True
     return False

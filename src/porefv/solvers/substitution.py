@@ -1,0 +1,134 @@
+"""Forward and backward substitution with an approximate Cholesky factor, in one piece or in parts side by side."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from porefv.system.kernels import njit, prange
+
+
+class FactorColumns(NamedTuple):
+    """A factor L D Lᵀ, column by column. Indices without sign need no look at whether they count from the end.
+
+    Attributes
+    ----------
+    order : (n,) uint32 array
+        Node at each position.
+    starts : (n + 1,) uint32, rows : (fill,) uint32, factors : (fill,) float32 arrays
+        Column k of -L below its unit diagonal has the entries starts[k] ... starts[k + 1] - 1 of `factors`, in `rows`.
+    inverse_pivots : (n,) array
+        1 / D [Pa s/m³].
+    """
+
+    order: np.ndarray
+    starts: np.ndarray
+    rows: np.ndarray
+    factors: np.ndarray
+    inverse_pivots: np.ndarray
+
+
+class FactorRows(NamedTuple):
+    """The last rows of -L, row by row: entries starts[i] ... starts[i + 1] - 1 of `factors`, in `columns`.
+
+    Attributes
+    ----------
+    starts : (m + 1,) int64, columns : (e,) int32, factors : (e,) float32 arrays
+    """
+
+    starts: np.ndarray
+    columns: np.ndarray
+    factors: np.ndarray
+
+
+@njit(cache=True)
+def rows_from(factor, n_inner):
+    """The entries of the first n_inner columns in the rows from n_inner on."""
+    starts, rows, factors = factor.starts, factor.rows, factor.factors
+    n = starts.shape[0] - 1
+    row_starts = np.zeros(n - n_inner + 1, np.int64)
+    for e in range(starts[n_inner]):
+        if rows[e] >= n_inner:
+            row_starts[rows[e] - n_inner + 1] += 1
+    for i in range(n - n_inner):
+        row_starts[i + 1] += row_starts[i]
+    columns = np.empty(row_starts[-1], np.int32)
+    row_factors = np.empty(row_starts[-1], np.float32)
+    place = row_starts[:-1].copy()
+    for k in range(n_inner):
+        for e in range(starts[k], starts[k + 1]):
+            i = np.int64(rows[e]) - n_inner
+            if i >= 0:
+                columns[place[i]] = k
+                row_factors[place[i]] = factors[e]
+                place[i] += 1
+    return FactorRows(row_starts, columns, row_factors)
+
+
+@njit(cache=True, error_model="numpy")
+def substitute(factor, r, z, y):
+    """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z."""
+    order, starts, rows, factors, _ = factor
+    n = order.shape[0]
+    for k in range(n):
+        y[k] = r[order[k]]
+    for k in range(n):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            y[rows[e]] += factors[e] * v
+    return _backward(factor, 0, n, r, z, y)
+
+
+@njit(cache=True, parallel=True)
+def substitute_parts(parts, factor, separator_rows, r, z, y):
+    """The same, parts side by side."""
+    order, starts, rows, factors, _ = factor
+    row_starts, row_columns, row_factors = separator_rows
+    n = order.shape[0]
+    n_parts = parts.shape[0] - 1
+    n_inner = parts[n_parts]
+    products = np.zeros(n_parts + 1)
+    for part in prange(n_parts):
+        _forward(factor, parts[part], parts[part + 1], n_inner, r, y)
+    for i in prange(n - n_inner):
+        s = r[order[n_inner + i]]
+        for e in range(row_starts[i], row_starts[i + 1]):
+            s += row_factors[e] * y[row_columns[e]]
+        y[n_inner + i] = s
+    for k in range(n_inner, n):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            y[rows[e]] += factors[e] * v
+    products[n_parts] = _backward(factor, n_inner, n, r, z, y)
+    for part in prange(n_parts):
+        products[part] = _backward(factor, parts[part], parts[part + 1], r, z, y)
+    return products.sum()
+
+
+@njit(cache=True)
+def _forward(factor, first, last, n_inner, r, y):
+    """y = L⁻¹ r within one part."""
+    order, starts, rows, factors, _ = factor
+    for k in range(first, last):
+        y[k] = r[order[k]]
+    for k in range(first, last):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            if rows[e] < n_inner:
+                y[rows[e]] += factors[e] * v
+
+
+@njit(cache=True, error_model="numpy")
+def _backward(factor, first, last, r, z, y):
+    """y and z = L⁻ᵀ D⁻¹ y for one part; returns its part of r·z."""
+    order, starts, rows, factors, inverse_pivots = factor
+    product = 0.0
+    for k in range(last - 1, first - 1, -1):
+        s = y[k] * inverse_pivots[k]
+        for e in range(starts[k], starts[k + 1]):
+            s += factors[e] * y[rows[e]]
+        y[k] = s
+        z[order[k]] = s
+        product += s * r[order[k]]
+    return product
