@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from types import NoneType
 from typing import TYPE_CHECKING
 
@@ -36,6 +35,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
 from porefv.solvers.solver import TOLERANCE, SolverReport
+from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.system.number_checks import MOST, ensure_finite, three_numbers
 from porefv.system.timer import Timer
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
 
 
-class PoreFlow:
+class PoreFlow(FixedInputs):
     """Steady flow of a viscous fluid through the pores of a fixed packing (C12).
 
     Pressures are piezometric, p = p* - ρ g·x: what drives the flow, without the hydrostatic part that gravity adds.
@@ -146,7 +146,7 @@ class PoreFlow:
 
     # ---- pressure -----------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def _held(self) -> np.ndarray:
         """Imposed pressures less the lowest of them."""
         return held_pressures(self.mesh, self.walls.pressures - self._reference)
@@ -164,13 +164,13 @@ class PoreFlow:
         """
         return self._held + self._reference
 
-    @cached_property
+    @lazy_property
     def conductances(self) -> np.ndarray:
         """(t,): K of each throat, q = K (p_i - p_j); zero where closed [m³/(Pa s)]."""
         with Timer(self.timings, "throats"):
             return throat_conductances(self.mesh, self.conductance, self.walls.slip, self.fluid.viscosity)
 
-    @cached_property
+    @lazy_property
     def solution(self) -> PressureField:
         """The pressure field, with the solver's report and the isolated pores."""
         if self._given is not None:
@@ -179,12 +179,12 @@ class PoreFlow:
         with Timer(self.timings, "solve"):
             return solve_pressure(self.mesh, conductances, self.walls, solver=self.solver, tolerance=self.tolerance)
 
-    @cached_property
+    @lazy_property
     def pressure(self) -> np.ndarray:
         """(n_pores,): piezometric pressure of each pore [Pa]."""
         return self.solution.pressure
 
-    @cached_property
+    @lazy_property
     def _acting(self) -> PressureField:
         return acting_pressure(self.mesh, self.conductance, self.conductances, self.walls, self.solution)
 
@@ -205,12 +205,12 @@ class PoreFlow:
 
     # ---- fluxes -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def flux(self) -> np.ndarray:
         """(t,): flux through each throat, from its first pore to its second [m³/s]."""
         return fluxes(self.mesh, self.conductances, self.solution)
 
-    @cached_property
+    @lazy_property
     def _face_flux(self) -> np.ndarray:
         """(w,): flux into the sample through each wall face [m³/s]."""
         return wall_face_fluxes(self.mesh, net_outflows(self.mesh, self.flux), self.walls.held)
@@ -237,7 +237,7 @@ class PoreFlow:
         larger = max(self.inflow, self.outflow)
         return abs(self.inflow - self.outflow) / larger if larger > 0.0 else 0.0
 
-    @cached_property
+    @lazy_property
     def permeability(self) -> float:
         """k = μ Q h0 / (ΔP S) along the axis of the two pressure walls (C12 §3.3) [m²].
 
@@ -262,7 +262,7 @@ class PoreFlow:
         """k ρ g / μ, with standard gravity [m/s]."""
         return self.permeability * self.fluid.density * STANDARD_GRAVITY / self.fluid.viscosity
 
-    @cached_property
+    @lazy_property
     def pore_velocity(self) -> np.ndarray:
         """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
         return ensure_finite(pore_velocities(self.mesh, self.flux, self._face_flux), "velocities")
@@ -292,7 +292,7 @@ class PoreFlow:
 
     # ---- forces -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def forces(self) -> Forces:
         """Forces on every sphere and wall."""
         _ = self.solution  # timed by itself

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from porefv.mesh.laguerre import laguerre_volumes
 from porefv.packing.box import WALL_NORMALS, Box
 from porefv.packing.memory_estimate import ensure_room_for_spheres
 from porefv.packing.packing import Packing
+from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.tessellation.triangulation import RegularTriangulation, wall_offsets
 from porefv.tessellation.vertices import Vertices
 
@@ -43,7 +43,7 @@ class WallFaces:
     centroids: np.ndarray
 
 
-class CellMesh:
+class CellMesh(FixedInputs):
     """Cells of the regular triangulation of a packing: tetrahedra, wedges and hexahedra that fill the box.
 
     A cell is the centres of its spheres, swept to its walls. Everything is computed when first asked for.
@@ -72,7 +72,7 @@ class CellMesh:
 
     # ---- topology ---------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def triangulation(self) -> RegularTriangulation:
         """The regular triangulation the mesh is made of."""
         ensure_room_for_spheres(self.n_spheres)
@@ -98,41 +98,41 @@ class CellMesh:
         """Number of cells."""
         return len(self.cells)
 
-    @cached_property
+    @lazy_property
     def facets(self) -> Facets:
         """The facets between the cells."""
         return Facets(self)
 
     # ---- geometry ---------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def local_points(self) -> np.ndarray:
         """(n + 6, 3): sphere centres from the local origin, then the walls' outward normals [m, -]."""
         return np.concatenate([self.packing.centres - self.triangulation.origin, WALL_NORMALS])
 
-    @cached_property
+    @lazy_property
     def sizes(self) -> np.ndarray:
         """(n + 6,): sphere radii, then the walls' offsets along their normals from the local origin [m]."""
         return np.concatenate([self.packing.radii, wall_offsets(self.box, self.triangulation.origin)])
 
-    @cached_property
+    @lazy_property
     def cell_vertices(self) -> Vertices:
         """The spheres and walls that are the vertices of the cells, as kernels take them."""
         return Vertices(self.n_spheres, self.local_points, self.sizes)
 
-    @cached_property
+    @lazy_property
     def local_vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex of each cell from the local origin, that of a flat cell being a neighbour's [m]."""
         vertices = self.triangulation.local_vertices.copy()
         settle_flat_cells(self.cells, self.neighbours, self.cell_vertices, vertices)
         return vertices
 
-    @cached_property
+    @lazy_property
     def vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex (power centre) of each cell [m]."""
         return self.local_vertices + self.triangulation.origin
 
-    @cached_property
+    @lazy_property
     def cell_volumes(self) -> np.ndarray:
         """(m,): volume of each cell, tetrahedron, wedge or hexahedron; they fill the box [m³]."""
         return polyhedron_volumes(self.cells, self.cell_vertices)
@@ -165,12 +165,12 @@ class CellMesh:
         """
         return volume_gradients(self.cells, self.cell_vertices)
 
-    @cached_property
+    @lazy_property
     def cell_void_volumes(self) -> np.ndarray:
         """(m,): volume of each cell outside the spheres [m³]."""
         return self.cell_volumes - cell_solids(self.cells, self.cell_vertices)
 
-    @cached_property
+    @lazy_property
     def laguerre_volumes(self) -> np.ndarray:
         """(n,): volume of each sphere's Laguerre cell, all that is nearer to it, in power, than to others [m³].
 
@@ -178,7 +178,7 @@ class CellMesh:
         """
         return laguerre_volumes(self.facets.topology, self.local_vertices, self.cell_vertices)
 
-    @cached_property
+    @lazy_property
     def wall_faces(self) -> WallFaces:
         """The faces of the cells on the walls: they tile the box's surface."""
         return WallFaces(*enumerate_wall_faces(self.cells, self.cell_vertices))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +9,13 @@ import numpy as np
 from porefv.mesh.facet_cross_sections import CrossSections, facet_cross_sections
 from porefv.mesh.facet_kernels import FacetPlanes, FacetTopology, enumerate_facets, facet_centroids
 from porefv.mesh.facet_volumes import facet_volumes
+from porefv.system.lazy import FixedInputs, lazy_property
 
 if TYPE_CHECKING:
     from porefv.mesh.cell_mesh import CellMesh
 
 
-class Facets:
+class Facets(FixedInputs):
     """Facets between the cells of a mesh, one row each; everything is computed when first asked for.
 
     A facet is a triangle (three spheres), a trapezoid (two spheres and a wall) or a rectangle (one sphere and two
@@ -36,7 +36,7 @@ class Facets:
 
     # ---- topology -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def topology(self) -> FacetTopology:
         """Cells and vertices of each facet, as kernels take them."""
         mesh = self.mesh
@@ -61,7 +61,7 @@ class Facets:
 
     # ---- the facet as a cross-section -------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def _cross_sections(self) -> CrossSections:
         f = len(self)
         found = CrossSections(
@@ -113,7 +113,7 @@ class Facets:
 
     # ---- the space between the two Laguerre vertices ----------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
         volumes, surfaces = np.empty(len(self)), np.empty((len(self), 3))
         facet_volumes(self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes, surfaces)

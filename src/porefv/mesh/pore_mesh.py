@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from porefv.mesh.throats import Throats
 from porefv.mesh.uniting import unite
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.system.lazy import lazy_property
 
 if TYPE_CHECKING:
     from porefv.fipy.pore_mesh import FipyPoreMesh
@@ -70,7 +70,7 @@ class PoreMesh(CellMesh):
         super().__init__(packing, box, wall_tolerance=wall_tolerance)
         self.unite_tolerance = unite_tolerance
 
-    @cached_property
+    @lazy_property
     def _united(self) -> tuple[np.ndarray, np.ndarray]:
         exact, asked = (
             unite(self.facets.topology, self.local_vertices, self.cell_vertices, tolerance)
@@ -88,11 +88,11 @@ class PoreMesh(CellMesh):
         """(m,) int32: pore of each cell."""
         return self._united[1]
 
-    @cached_property
+    @lazy_property
     def n_pores(self) -> int:
         return int(self.cell_pore.max()) + 1
 
-    @cached_property
+    @lazy_property
     def cells_of_pores(self) -> PoreCells:
         """The cells of each pore."""
         order = np.argsort(self.cell_pore, kind="stable")
@@ -103,12 +103,12 @@ class PoreMesh(CellMesh):
         """Number of pores lost to uniting: cells less pores."""
         return self.n_cells - self.n_pores
 
-    @cached_property
+    @lazy_property
     def pore_volumes(self) -> np.ndarray:
         """(n_pores,): void volume of each pore [m³]."""
         return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
 
-    @cached_property
+    @lazy_property
     def throats(self) -> Throats:
         """The throats between the pores."""
         return Throats(self)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -12,6 +11,7 @@ import numpy as np
 from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.inscribed_circles import Circles, circle_portions, inscribed_circles
 from porefv.mesh.uniting import tied_facets
+from porefv.system.lazy import FixedInputs, lazy_property
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
@@ -33,7 +33,7 @@ class ThroatFacets(NamedTuple):
     starts: np.ndarray
 
 
-class Throats:
+class Throats(FixedInputs):
     """Throats of a mesh: one row per Laguerre edge between two pores, dual to one facet.
 
     Facets that share their Laguerre edge (the triangles into which a tie cuts a polygon) are one throat. Facets
@@ -62,7 +62,7 @@ class Throats:
 
     # ---- which facets belong to which throat --------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def first_facets(self) -> np.ndarray:
         """(t,): a facet of each throat; the throat takes its sense."""
         first, second = self.mesh.facets.cells.T
@@ -70,7 +70,7 @@ class Throats:
         passes[self._further[0]] = False
         return np.flatnonzero(passes)
 
-    @cached_property
+    @lazy_property
     def _further(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The further facets of throats that a tie has cut in several: their ids, first facets and senses."""
         mesh = self.mesh
@@ -84,7 +84,7 @@ class Throats:
         sense = np.where(nodes[further, 0] == nodes[first[further], 0], 1.0, -1.0)
         return several[further], several[first[further]], sense
 
-    @cached_property
+    @lazy_property
     def facet_throat(self) -> np.ndarray:
         """(f,) int: throat of each facet, -1 inside a united pore."""
         throat = np.full(len(self.mesh.facets.cells), -1)
@@ -93,7 +93,7 @@ class Throats:
         throat[further] = throat[first]
         return throat
 
-    @cached_property
+    @lazy_property
     def facets_of_throats(self) -> ThroatFacets:
         """The facets of each throat."""
         further, first, _ = self._further
@@ -134,17 +134,17 @@ class Throats:
 
     # ---- geometry -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @lazy_property
     def pores(self) -> np.ndarray:
         """(t, 2) int32: the two pores of each throat."""
         return self.mesh.cell_pore[self.mesh.facets.cells[self.first_facets]]
 
-    @cached_property
+    @lazy_property
     def normals(self) -> np.ndarray:
         """(t, 3): unit normal of each throat, from its first pore to its second."""
         return self.mesh.facets.normals[self.first_facets]
 
-    @cached_property
+    @lazy_property
     def lengths(self) -> np.ndarray:
         """(t,): length L of each throat, between its Laguerre vertices [m]."""
         return self.mesh.facets.lengths[self.first_facets]
@@ -154,7 +154,7 @@ class Throats:
         """(t,): lengths, those at the level of rounding or below as 2.2e-16 of the smallest radius [m]."""
         return np.maximum(self.lengths, np.finfo(float).eps * float(self.mesh.packing.radii.min()))
 
-    @cached_property
+    @lazy_property
     def doubling_heights(self) -> np.ndarray:
         """(f,): height over the constriction at which the section of each facet's throat has twice its fluid area [m].
 
@@ -167,17 +167,17 @@ class Throats:
         areas = np.maximum(self.total_by_facet(facets.fluid_areas), 0.0)
         return np.sqrt(np.divide(2.0 * areas, angles, out=np.zeros_like(areas), where=angles > 0.0))
 
-    @cached_property
+    @lazy_property
     def areas(self) -> np.ndarray:
         """(t,): cross-section A of each throat, solid and fluid [m²]."""
         return self._total(self.mesh.facets.areas)
 
-    @cached_property
+    @lazy_property
     def fluid_areas(self) -> np.ndarray:
         """(t,): fluid cross-section A^f of each throat [m²]."""
         return self._total(self.mesh.facets.fluid_areas)
 
-    @cached_property
+    @lazy_property
     def volumes(self) -> np.ndarray:
         """(t,): void volume φ of each throat [m³]."""
         return self._total(self.mesh.facets.volumes)
@@ -238,7 +238,7 @@ class Throats:
         inscribed_circles(vertices, self.mesh.cell_vertices, slip, *found)
         return found
 
-    @cached_property
+    @lazy_property
     def _tied_corner_triples(self) -> tuple[np.ndarray, np.ndarray]:
         """All triples of vertices, a sphere first, of each throat that a tie has cut: throats (p,), vertices (p, 3)."""
         mesh = self.mesh
@@ -269,7 +269,7 @@ class Throats:
         """(t,) bool: throats whose spheres cover the facet between them."""
         return self.mesh.facets.covered[self.first_facets]
 
-    @cached_property
+    @lazy_property
     def closed(self) -> np.ndarray:
         """(t,) bool: throats without a fluid cross-section: A^f <= 0, or covered by their spheres. Nothing flows."""
         return (self.fluid_areas <= 0.0) | self.covered
