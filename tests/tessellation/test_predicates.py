@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from porefv.packing.box import WALL_NORMALS
 from porefv.tessellation.predicates import in_conflict, power_centre, side
+from porefv.tessellation.vertices import Vertices
 
 N = 5  # spheres 0 ... 3 may be vertices of the cell, sphere 4 is asked about; walls are 5 ... 10
 Q = 4
@@ -97,7 +98,7 @@ def heights_of(points, weights):
 def test_side_is_the_sign_of_the_exact_minor(problem):
     cell, points, weights = problem
     for i, minor in enumerate(signed_minors(rows_from(Q, cell, points))):
-        assert side(cell, i, Q, N, points, weights) == (minor > 0) - (minor < 0)
+        assert side(cell, i, Q, Vertices(N, points, weights)) == (minor > 0) - (minor < 0)
 
 
 def exact_conflict(cell, points, weights):
@@ -119,7 +120,7 @@ def exact_conflict(cell, points, weights):
 @given(problems())
 def test_conflict_is_exact(problem):
     cell, points, weights = problem
-    assert in_conflict(cell, Q, N, points, weights) == exact_conflict(cell, points, weights)[0]
+    assert in_conflict(cell, Q, Vertices(N, points, weights)) == exact_conflict(cell, points, weights)[0]
 
 
 def test_ties_of_a_cubic_lattice_are_broken_by_weights_lowered_in_the_order_of_the_centres():
@@ -140,7 +141,7 @@ def test_ties_of_a_cubic_lattice_are_broken_by_weights_lowered_in_the_order_of_t
         if o < 0:
             cell[:2] = cell[1::-1]
         expected, tie = exact_conflict(cell, points, weights)
-        assert in_conflict(cell, Q, N, points, weights) == expected
+        assert in_conflict(cell, Q, Vertices(N, points, weights)) == expected
         ties += tie
     assert ties > 100
 
@@ -149,7 +150,7 @@ def test_ties_of_a_cubic_lattice_are_broken_by_weights_lowered_in_the_order_of_t
 def test_conflict_does_not_depend_on_the_order_of_the_vertices(problem):
     cell, points, weights = problem
     said = {
-        bool(in_conflict(cell[list(even)], Q, N, points, weights))
+        bool(in_conflict(cell[list(even)], Q, Vertices(N, points, weights)))
         for even in [(0, 1, 2, 3), (1, 2, 0, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 1, 0, 2), (0, 3, 1, 2)]
     }
     assert len(said) == 1
@@ -169,7 +170,7 @@ def test_power_centre_is_rounded_correctly_but_for_a_few_units_in_the_last_place
         else:
             heights.append(sum(a * a for a in r) - Fraction(float(weights[v])) ** 2 + weight)
     d = det(*rows)
-    centre = power_centre(cell, q, N, points, weights)
+    centre = power_centre(cell, q, Vertices(N, points, weights))
     for axis in range(3):
         columns = [[*r[:axis], h, *r[axis + 1 :]] for r, h in zip(rows, heights, strict=True)]
         exact = det(*columns) / (2 * d)

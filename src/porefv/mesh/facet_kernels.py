@@ -162,8 +162,8 @@ def centroid(a, b, c, vertices):
     else:
         s = 0.5 * wall_distance(a, b, vertices)
         t = 0.5 * wall_distance(a, c, vertices)
-    within = plus(times(s, towards(a, b, vertices)), times(t, towards(a, c, vertices)))
-    return plus(vector_at(a, vertices.points), within)
+    along = plus(vector_at(a, vertices.points), times(s, towards(a, b, vertices)))
+    return plus(along, times(t, towards(a, c, vertices)))
 
 
 @njit(cache=True)

@@ -1,8 +1,7 @@
-"""The two questions a regular triangulation asks, answered exactly, for spheres and ideal walls alike.
+"""The two predicates of a regular triangulation, evaluated exactly, for spheres and ideal walls alike.
 
 Vertices
-    ``points[v]``, ``weights[v]``: centre and radius of sphere v < n; outward unit direction d and offset s
-    of the wall d·x = s for v >= n (the limit of a sphere of infinite radius).
+    Spheres and walls, as of `porefv.tessellation.vertices`. A wall is the limit of a sphere of infinite radius.
 Rows of a cell (v0, v1, v2, v3), seen from the sphere q
     a_k = c_k - c_q, H_k = |a_k|² - r_k² + r_q² for a sphere;  a_k = d, H_k = 2 (s - d·c_q) for a wall.
     C_k = (-1)^(k+3) det(the other three a): the orientation of the cell with v_k replaced by q.
@@ -29,20 +28,29 @@ _CONFLICT_BOUND = 24.0 * EPSILON
 
 
 @njit(cache=True)
-def determinant(a, b, c):
-    """det of three rows and its permanent of absolute values (the scale of its rounding error)."""
-    m0 = b[1] * c[2] - b[2] * c[1]
-    m1 = b[2] * c[0] - b[0] * c[2]
-    m2 = b[0] * c[1] - b[1] * c[0]
-    p0 = abs(b[1] * c[2]) + abs(b[2] * c[1])
-    p1 = abs(b[2] * c[0]) + abs(b[0] * c[2])
-    p2 = abs(b[0] * c[1]) + abs(b[1] * c[0])
-    return a[0] * m0 + a[1] * m1 + a[2] * m2, abs(a[0]) * p0 + abs(a[1]) * p1 + abs(a[2]) * p2
+def minors(b, c):
+    """The vector b × c of two rows, and its permanents of absolute values (the scale of its rounding error)."""
+    return (
+        (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]),
+        (
+            abs(b[1] * c[2]) + abs(b[2] * c[1]),
+            abs(b[2] * c[0]) + abs(b[0] * c[2]),
+            abs(b[0] * c[1]) + abs(b[1] * c[0]),
+        ),
+    )
 
 
 @njit(cache=True)
-def row(v, q, n, points, weights):
+def determinant(a, b, c):
+    """det of three rows and its permanent of absolute values (the scale of its rounding error)."""
+    m, p = minors(b, c)
+    return a[0] * m[0] + a[1] * m[1] + a[2] * m[2], abs(a[0]) * p[0] + abs(a[1]) * p[1] + abs(a[2]) * p[2]
+
+
+@njit(cache=True)
+def row(v, q, vertices):
     """a_k, H_k and the magnitude of the terms of H_k, in floating point."""
+    n, points, weights = vertices
     if v < n:
         x = points[v, 0] - points[q, 0]
         y = points[v, 1] - points[q, 1]
@@ -59,29 +67,29 @@ def row(v, q, n, points, weights):
 
 
 @njit(cache=True)
-def side(cell, i, q, n, points, weights):
+def side(cell, i, q, vertices):
     """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i."""
     j, k, m = _others(i)
-    a, _, _ = row(cell[j], q, n, points, weights)
-    b, _, _ = row(cell[k], q, n, points, weights)
-    c, _, _ = row(cell[m], q, n, points, weights)
+    a, _, _ = row(cell[j], q, vertices)
+    b, _, _ = row(cell[k], q, vertices)
+    c, _, _ = row(cell[m], q, vertices)
     value, permanent = determinant(a, b, c)
     if abs(value) > _MINOR_BOUND * permanent:
         s = 1 if value > 0.0 else -1
     else:
         exact = np.empty(192)
-        rows = _exact_rows(cell, q, n, points)
+        rows = _exact_rows(cell, q, vertices)
         s = sign(exact, _exact_minor(rows, j, k, m, exact))
     return -s if i % 2 == 0 else s
 
 
 @njit(cache=True)
-def in_conflict(cell, q, n, points, weights):
+def in_conflict(cell, q, vertices):
     """Whether the sphere q lies closer, in power, to the cell's power centre than the cell's own vertices."""
-    a0, h0, t0 = row(cell[0], q, n, points, weights)
-    a1, h1, t1 = row(cell[1], q, n, points, weights)
-    a2, h2, t2 = row(cell[2], q, n, points, weights)
-    a3, h3, t3 = row(cell[3], q, n, points, weights)
+    a0, h0, t0 = row(cell[0], q, vertices)
+    a1, h1, t1 = row(cell[1], q, vertices)
+    a2, h2, t2 = row(cell[2], q, vertices)
+    a3, h3, t3 = row(cell[3], q, vertices)
     c0, p0 = determinant(a1, a2, a3)
     c1, p1 = determinant(a0, a2, a3)
     c2, p2 = determinant(a0, a1, a3)
@@ -89,17 +97,17 @@ def in_conflict(cell, q, n, points, weights):
     value = -h0 * c0 + h1 * c1 - h2 * c2 + h3 * c3
     if abs(value) > _CONFLICT_BOUND * (t0 * p0 + t1 * p1 + t2 * p2 + t3 * p3):
         return value > 0.0
-    s = _exact_conflict(cell, q, n, points, weights)
+    s = _exact_conflict(cell, q, vertices)
     if s == 0:
-        s = _perturbed_conflict(cell, q, n, points, weights)
+        s = _perturbed_conflict(cell, q, vertices)
     return s > 0
 
 
 @njit(cache=True)
-def power_centre(cell, q, n, points, weights):
+def power_centre(cell, q, vertices):
     """Power centre of a cell relative to its sphere q, correctly rounded from exact determinants."""
     centre = np.empty(3)
-    rows = _exact_rows(cell, q, n, points)
+    rows = _exact_rows(cell, q, vertices)
     numerator = np.empty(36864)
     product = np.empty(9216)
     total = np.empty(36864)
@@ -121,7 +129,7 @@ def power_centre(cell, q, n, points, weights):
             b = others[(k + 1) % 3]
             c = others[(k + 2) % 3]
             nm = _exact_minor2(rows, b, c, u, v, minor)
-            nh = _exact_height(cell[others[k]], q, rows, others[k], n, points, weights, height)
+            nh = _exact_height(cell[others[k]], q, rows, others[k], vertices, height)
             np_ = multiply(minor, nm, height, nh, product)
             for i in range(count):
                 total[i] = numerator[i]
@@ -132,6 +140,7 @@ def power_centre(cell, q, n, points, weights):
 
 @njit(cache=True)
 def _others(i):
+    """The other three places of a cell."""
     if i == 0:
         return 1, 2, 3
     if i == 1:
@@ -142,8 +151,9 @@ def _others(i):
 
 
 @njit(cache=True)
-def _exact_rows(cell, q, n, points):
+def _exact_rows(cell, q, vertices):
     """The rows a_k as (4, 3, 2): each entry the exact sum of a small and a large double."""
+    n, points, _ = vertices
     rows = np.zeros((4, 3, 2))
     for k in range(4):
         v = cell[k]
@@ -207,8 +217,9 @@ def _exact_minor(rows, j, k, m, out):
 
 
 @njit(cache=True)
-def _exact_height(v, q, rows, k, n, points, weights, out):
+def _exact_height(v, q, rows, k, vertices, out):
     """H_k of vertex v in row k (at most 24 components)."""
+    n, points, weights = vertices
     term = np.empty(2)
     total = np.empty(32)
     count = 0
@@ -243,9 +254,9 @@ def _exact_height(v, q, rows, k, n, points, weights, out):
 
 
 @njit(cache=True)
-def _exact_conflict(cell, q, n, points, weights):
+def _exact_conflict(cell, q, vertices):
     """Sign of Δ in exact arithmetic."""
-    rows = _exact_rows(cell, q, n, points)
+    rows = _exact_rows(cell, q, vertices)
     minor = np.empty(192)
     height = np.empty(32)
     counts = np.zeros(4, np.int64)
@@ -253,7 +264,7 @@ def _exact_conflict(cell, q, n, points, weights):
     for k in range(4):
         i, j, m = _others(k)
         nm = _exact_minor(rows, i, j, m, minor)
-        nh = _exact_height(cell[k], q, rows, k, n, points, weights, height)
+        nh = _exact_height(cell[k], q, rows, k, vertices, height)
         counts[k] = multiply(minor, nm, height, nh, products[k])
         if k % 2 == 0:
             for c in range(counts[k]):
@@ -268,6 +279,7 @@ def _exact_conflict(cell, q, n, points, weights):
 
 @njit(cache=True)
 def _precedes(u, v, points):
+    """Whether vertex u comes before v in lexicographic order of the points (n + 6, 3)."""
     for axis in range(3):
         if points[u, axis] != points[v, axis]:
             return points[u, axis] < points[v, axis]
@@ -275,12 +287,13 @@ def _precedes(u, v, points):
 
 
 @njit(cache=True)
-def _perturbed_conflict(cell, q, n, points, weights):
+def _perturbed_conflict(cell, q, vertices):
     """Sign of Δ when its exact value is zero: that of the first non-zero derivative by a perturbed weight.
 
     Raising h_k = |c_k|² - r_k² of a vertex by ε changes Δ by ε C_k, that of q by -ε O; O > 0 never
     vanishes, so a decision is always reached.
     """
+    n, points, _ = vertices
     rank = np.empty(5, np.int64)  # positions 0..3 in the cell, 4 for q, in order of decreasing perturbation
     count = 0
     for k in range(5):
@@ -299,7 +312,7 @@ def _perturbed_conflict(cell, q, n, points, weights):
     for p in range(count):
         if rank[p] == 4:
             return -1
-        s = side(cell, rank[p], q, n, points, weights)
+        s = side(cell, rank[p], q, vertices)
         if s != 0:
             return s
     return -1

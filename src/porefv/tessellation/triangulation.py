@@ -11,6 +11,7 @@ from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES, Box
 from porefv.system.kernels import njit
 from porefv.tessellation.blocks import triangulate
 from porefv.tessellation.ordering import morton_codes
+from porefv.tessellation.vertices import Vertices
 
 
 class RegularTriangulation:
@@ -68,9 +69,11 @@ class RegularTriangulation:
         curve = np.argsort(morton_codes(points[:n]), kind="stable")
         points[:n] = points[curve]
         weights[:n] = weights[curve]
-        cells, self.neighbours, planes = triangulate(points, weights, n, box.size * scale)
-        self.local_vertices = _vertices(cells, planes, n, weights, 1.0 / scale)
-        self.cells = np.concatenate([curve, np.arange(n, n + 6)]).astype(np.int32)[cells]
+        vertices = Vertices(n, points, weights)
+        found = triangulate(vertices, box.size * scale)
+        self.neighbours = found.neighbours
+        self.local_vertices = _power_centres(found, vertices, 1.0 / scale)
+        self.cells = np.concatenate([curve, np.arange(n, n + 6)]).astype(np.int32)[found.vertices]
 
     @cached_property
     def vertices(self) -> np.ndarray:
@@ -106,14 +109,16 @@ def exact_origin(box: Box) -> np.ndarray:
 
 
 @njit(cache=True)
-def _vertices(cells, planes, n, weights, length):
-    """(m, 3): power centre of each cell; those of cells with walls lie on them exactly."""
-    vertices = np.empty((cells.shape[0], 3))
+def _power_centres(found, vertices, length):
+    """(m, 3): power centre of each cell, in units of 1 / length; those of cells with walls lie on them exactly."""
+    cells, _, planes = found
+    n, _, sizes = vertices
+    centres = np.empty((cells.shape[0], 3))
     for t in range(cells.shape[0]):
         for axis in range(3):
-            vertices[t, axis] = 0.5 * planes[t, axis] * length
+            centres[t, axis] = 0.5 * planes[t, axis] * length
         for i in range(4):
             wall = cells[t, i] - n
             if wall >= 0:
-                vertices[t, WALL_AXES[wall]] = WALL_SENSES[wall] * (weights[n + wall] * length)
-    return vertices
+                centres[t, WALL_AXES[wall]] = WALL_SENSES[wall] * (sizes[n + wall] * length)
+    return centres
