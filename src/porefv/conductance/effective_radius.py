@@ -22,6 +22,7 @@ class EffectiveRadius(ConductanceModel):
     name = "effective-radius"
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        """(t,): conductivity g of each throat [m⁴]; `slip` (6,) bool marks the walls of symmetry."""
         images = throats.mirror_images(slip)
         equivalent = np.sqrt(images * np.maximum(throats.fluid_areas, 0.0) / np.pi)
         radii = 0.25 * (equivalent + throats.inscribed_radii(slip))

@@ -33,6 +33,7 @@ class HydraulicRadius(ConductanceModel):
             raise InputError(f"alpha must lie between {LEAST:g} and {MOST:g}, not {self.alpha!r}")
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        """(t,): conductivity g of each throat [m⁴]; `slip` (6,) bool marks the walls of symmetry."""
         return _hydraulic_radius(self.alpha, throats.fluid_areas, throats.volumes, throats.wetted_surfaces(slip))
 
 

@@ -90,6 +90,7 @@ class PoreMesh(CellMesh):
 
     @lazy_property
     def n_pores(self) -> int:
+        """Number of pores."""
         return int(self.cell_pore.max()) + 1
 
     @lazy_property

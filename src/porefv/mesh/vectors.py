@@ -9,37 +9,44 @@ from porefv.system.kernels import njit
 
 @njit(cache=True)
 def cross_product(a, b):
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
 def dot(a, b):
+    """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)
 def plus(a, b):
+    """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @njit(cache=True)
 def minus(a, b):
+    """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(cache=True)
 def times(factor, a):
+    """factor a."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @njit(cache=True)
 def unit(v):
+    """v / |v|, or v where that is zero."""
     length = np.sqrt(dot(v, v))
     return (v[0] / length, v[1] / length, v[2] / length) if length > 0.0 else v
 
 
 @njit(cache=True)
 def vector_at(i, array):
+    """Row i of an array (n, 3), as a tuple."""
     return array[i, 0], array[i, 1], array[i, 2]
 
 

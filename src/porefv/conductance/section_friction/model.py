@@ -48,6 +48,7 @@ class SectionFriction(ConductanceModel):
                 raise InputError(f"{what} must be a positive number between {LEAST:g} and {MOST:g}, not {value!r}")
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
+        """(t,): conductivity g of each throat [m⁴]; `slip` (6,) bool marks the walls of symmetry."""
         return self._friction(throats, slip, np.arange(len(throats)))[0]
 
     def drop_beyond_vertices(self, throats: Throats, slip: np.ndarray) -> DropBeyondVertices:
