@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from porefv.flow.forces import Forces, grain_forces
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
-    from porefv.flow.solid_pressure import acting_pressure
+    from porefv.flow.pressure_on_grains import acting_pressure
     from porefv.flow.walls import Wall, Walls
     from porefv.mesh.cell_mesh import CellMesh
     from porefv.mesh.facets import Facets
@@ -78,7 +78,7 @@ _HOMES = {
     "WALLS": "porefv.packing.box",
     "Wall": "porefv.flow.walls",
     "Walls": "porefv.flow.walls",
-    "acting_pressure": "porefv.flow.solid_pressure",
+    "acting_pressure": "porefv.flow.pressure_on_grains",
     "fluxes": "porefv.flow.flux",
     "grain_forces": "porefv.flow.forces",
     "solve_pressure": "porefv.flow.pressure",

@@ -17,7 +17,7 @@ from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces, grain_forces
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
-from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.pressure_on_grains import solid_pressure_weights
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box

@@ -15,7 +15,7 @@ from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 from porefv.errors import InputError
-from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.pressure_on_grains import solid_pressure_weights
 
 DRAINED = Walls.from_mapping({"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
 SEALED = Walls.from_mapping({"lateral": {"slip": True}})

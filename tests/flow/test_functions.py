@@ -14,7 +14,7 @@ from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
 from porefv.flow.forces import grain_forces
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import solve_pressure
-from porefv.flow.solid_pressure import acting_pressure
+from porefv.flow.pressure_on_grains import acting_pressure
 from porefv.flow.walls import Wall, Walls
 from porefv.mesh.cell_mesh import CellMesh
 

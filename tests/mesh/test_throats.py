@@ -1,5 +1,7 @@
 """Throat geometry: sums that are exact, and single throats that can be worked out by hand."""
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -294,3 +296,10 @@ def test_circle_between_a_sphere_and_two_walls_touches_them_or_is_centred_on_the
 
 
 # ---- centres of pores ----------------------------------------------------------------------------------------
+
+
+def test_a_mesh_can_be_pickled_whatever_has_been_derived_from_it(mesh_of):
+    mesh = mesh_of("n25_s1")
+    assert mesh.throats.derived(lambda throats: len(throats)) == len(mesh.throats)
+    again = pickle.loads(pickle.dumps(mesh))
+    np.testing.assert_array_equal(again.throats.areas, mesh.throats.areas)

@@ -19,7 +19,7 @@ from porefv.dem.grain_model import GrainModel
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pressure import held_pressures
-from porefv.flow.solid_pressure import solid_pressure_weights
+from porefv.flow.pressure_on_grains import solid_pressure_weights
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS

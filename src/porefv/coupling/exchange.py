@@ -20,7 +20,7 @@ import numpy as np
 
 from porefv.conductance.model import ForceSplit
 from porefv.flow.forces import facet_forces
-from porefv.flow.solid_pressure import SolidPressureWeights
+from porefv.flow.pressure_on_grains import SolidPressureWeights
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_NORMALS
 from porefv.system.kernels import njit

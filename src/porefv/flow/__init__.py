@@ -5,7 +5,7 @@ from porefv.flow.flux import fluxes
 from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import PressureField, solve_pressure
-from porefv.flow.solid_pressure import SolidPressureWeights, acting_pressure, solid_pressure_weights
+from porefv.flow.pressure_on_grains import SolidPressureWeights, acting_pressure, solid_pressure_weights
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Wall, Walls
 

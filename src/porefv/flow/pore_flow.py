@@ -28,7 +28,7 @@ from porefv.flow.pressure import (
     reference_pressure,
     solve_pressure,
 )
-from porefv.flow.solid_pressure import acting_pressure
+from porefv.flow.pressure_on_grains import acting_pressure
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh

@@ -54,6 +54,10 @@ class Throats(FixedInputs):
         self._inscribed: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # by walls with slip
         self._derived: dict[Callable[[Throats], Any], Any] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What functions have derived is computed anew: a function may be one that cannot be pickled.
+        return {**vars(self), "_derived": {}}
+
     def derived(self, function: Callable[[Throats], Derived]) -> Derived:
         """function(throats), computed once and kept: for what a model needs of throats more than once."""
         if function not in self._derived:
