@@ -147,3 +147,11 @@ def test_files_are_binary_and_compressed(tmp_path):
     assert b'<AppendedData encoding="raw">' in content
     assert b"vtkLZ4DataCompressor" in content
     assert pyvista.read(tmp_path / "pores.vtu").n_cells == mesh.n_cells
+
+
+def test_arrays_of_another_number_of_rows_are_refused():
+    mesh = PoreMesh(two_spheres())
+    with pytest.raises(InputError, match=r"force must have 2 rows, not shape \(3, 3\)"):
+        spheres_polydata(mesh.packing, force=np.zeros((3, 3)))
+    with pytest.raises(InputError, match=rf"flux must have {len(mesh.throats)} rows, not shape \(1,\)"):
+        throats_polydata(mesh.throats, flux=np.zeros(1))

@@ -183,7 +183,7 @@ def _polydata(
         polydata.SetLines(cell_array(lines))
     if polygons is not None:
         polydata.SetPolys(cell_array(polygons))
-    attach(polydata.GetCellData(), data)
+    attach(polydata.GetCellData(), data, polydata.GetNumberOfCells())
     return polydata
 
 

@@ -52,7 +52,7 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
     data = {"pore": mesh.cell_pore} if isinstance(mesh, PoreMesh) else {}
     for name, values in cell_data.items():
         data[name] = values_by_cell(mesh, name, np.asarray(values))
-    attach(grid.GetCellData(), data)
+    attach(grid.GetCellData(), data, mesh.n_cells)
     return grid
 
 
@@ -62,7 +62,7 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(packing.centres))
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
-    attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data})
+    attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
     return polydata
 
 
@@ -79,5 +79,5 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(points))
     polydata.SetLines(cell_array(throats.pores))
-    attach(polydata.GetCellData(), cell_data)
+    attach(polydata.GetCellData(), cell_data, len(throats))
     return polydata

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv.errors import InputError
 from porefv.system.optional_imports import load
 
 if TYPE_CHECKING:
@@ -64,9 +65,11 @@ def cell_array(rows: np.ndarray) -> Any:
     return cells
 
 
-def attach(attributes: Any, arrays: dict[str, np.ndarray]) -> None:
-    """Add arrays by name to the point or cell data of a VTK dataset."""
+def attach(attributes: Any, arrays: dict[str, np.ndarray], rows: int) -> None:
+    """Add arrays by name to the point or cell data of a VTK dataset; InputError if one has another number of rows."""
     for name, values in arrays.items():
+        if np.shape(values)[:1] != (rows,):
+            raise InputError(f"{name} must have {rows} rows, not shape {np.shape(values)}")
         array = vtk_array(values)
         array.SetName(name)
         attributes.AddArray(array)
