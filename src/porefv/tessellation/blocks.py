@@ -127,7 +127,25 @@ def _join(blocks):
 
 @njit(cache=True, nogil=True)
 def cells_are_certain(cells, planes, own, n, points, weights, largest, axis, low, high):
-    """Whether every cell at a block's own spheres keeps clear of all spheres outside low <= x < high."""
+    """Whether every cell at a block's own spheres keeps clear of all spheres outside low <= x < high.
+
+    Parameters
+    ----------
+    cells, planes : (m, 4) int32 array, (m, 4) float64 array
+        Of the block with its halo: see `porefv.tessellation.insertion`. Free cells are passed over.
+    own : (n,) bool array
+        Spheres of the block itself.
+    n : int
+        Number of spheres of block and halo.
+    points, weights : (n + 6, 3), (n + 6,) float64 arrays
+        See `porefv.tessellation.predicates`.
+    largest : float
+        Largest radius of all spheres of the packing, in the unit of `points`.
+    axis : int
+        Axis of x, across which the box is cut into blocks: 0, 1 or 2.
+    low, high : float
+        Bounds of block and halo on the axis, in the unit of `points`.
+    """
     for t in range(cells.shape[0]):
         if cells[t, 0] < 0:
             continue

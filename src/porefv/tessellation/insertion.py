@@ -25,7 +25,24 @@ _CENTRE_TOLERANCE = 2.0**-30
 
 @njit(cache=True)
 def start(q, n, points, weights, cells, neighbours, planes, bounds, free, state, extent, magnitude):
-    """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box."""
+    """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box.
+
+    Parameters
+    ----------
+    q : int
+        The first sphere.
+    n : int
+        Number of spheres.
+    points, weights : (n + 6, 3), (n + 6,) float64 arrays
+        See `porefv.tessellation.predicates`.
+    cells, neighbours, planes, bounds, free, state : as in the module's docstring
+        The eight cells are written to the first places; `free` is left as it is.
+    extent : (3,) float64 array
+        Size of the box, in the unit of `points`.
+    magnitude : float
+        Bound on |c|² + r² of any sphere, plus the square of the largest offset of a wall, in the squared unit of
+        `points`.
+    """
     for corner in range(8):
         outward = 1
         cells[corner, 0] = q
@@ -49,7 +66,24 @@ def start(q, n, points, weights, cells, neighbours, planes, bounds, free, state,
 def insert(
     order, first, n, points, weights, cells, neighbours, planes, bounds, marks, ends, free, state, extent, magnitude
 ):
-    """Insert the spheres order[first:]; returns how many were done (fewer where the arrays are full)."""
+    """Insert the spheres order[first:]; returns how many were done (fewer where the arrays are full).
+
+    Parameters
+    ----------
+    order : (n,) int64 array
+        Spheres in the order of insertion.
+    first : int
+        Number of them that are done already, at least one.
+    n, points, weights, extent, magnitude
+        As for `start`.
+    cells, neighbours, planes, bounds, marks, ends, free, state : as in the module's docstring
+        Are changed in place.
+
+    Returns
+    -------
+    int
+        How many spheres of `order` are done, those before `first` included.
+    """
     capacity = cells.shape[0]
     stack = np.empty(1024, np.int32)
     boundary_cells = np.empty(1024, np.int32)

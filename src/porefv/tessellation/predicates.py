@@ -42,7 +42,25 @@ def determinant(a, b, c):
 
 @njit(cache=True)
 def row(v, q, n, points, weights):
-    """a_k, H_k and the magnitude of the terms of H_k, in floating point."""
+    """a_k, H_k and the magnitude of the terms of H_k, in floating point.
+
+    Parameters
+    ----------
+    v : int
+        The vertex v_k.
+    q : int
+        The sphere from which it is seen.
+    n : int
+        Number of spheres.
+    points, weights : (n + 6, 3), (n + 6,) float64 arrays
+        As in the module's docstring, lengths in any one unit.
+
+    Returns
+    -------
+    a : (float, float, float)
+    height, magnitude : float
+        H_k, in the squared unit of `points` for a sphere and in the unit for a wall, and the size of its terms.
+    """
     if v < n:
         x = points[v, 0] - points[q, 0]
         y = points[v, 1] - points[q, 1]
@@ -60,7 +78,24 @@ def row(v, q, n, points, weights):
 
 @njit(cache=True)
 def side(cell, i, q, n, points, weights):
-    """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i."""
+    """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i.
+
+    Parameters
+    ----------
+    cell : (4,) int32 array
+        Vertices of the cell, positively oriented.
+    i : int
+        Place of the vertex in the cell: 0 to 3.
+    q : int
+        The sphere.
+    n, points, weights
+        As for `row`.
+
+    Returns
+    -------
+    int
+        -1, 0 or 1.
+    """
     j, k, m = _others(i)
     a, _, _ = row(cell[j], q, n, points, weights)
     b, _, _ = row(cell[k], q, n, points, weights)
@@ -77,7 +112,17 @@ def side(cell, i, q, n, points, weights):
 
 @njit(cache=True)
 def in_conflict(cell, q, n, points, weights):
-    """Whether the sphere q lies closer, in power, to the cell's power centre than the cell's own vertices."""
+    """Whether the sphere q lies closer, in power, to the cell's power centre than the cell's own vertices.
+
+    Parameters
+    ----------
+    cell : (4,) int32 array
+        Vertices of the cell, positively oriented.
+    q : int
+        The sphere.
+    n, points, weights
+        As for `row`.
+    """
     a0, h0, t0 = row(cell[0], q, n, points, weights)
     a1, h1, t1 = row(cell[1], q, n, points, weights)
     a2, h2, t2 = row(cell[2], q, n, points, weights)
@@ -97,7 +142,22 @@ def in_conflict(cell, q, n, points, weights):
 
 @njit(cache=True)
 def power_centre(cell, q, n, points, weights):
-    """Power centre of a cell relative to its sphere q, correctly rounded from exact determinants."""
+    """Power centre of a cell relative to its sphere q, correctly rounded from exact determinants.
+
+    Parameters
+    ----------
+    cell : (4,) int32 array
+        Vertices of the cell, positively oriented.
+    q : int
+        The sphere, one of the cell's vertices.
+    n, points, weights
+        As for `row`.
+
+    Returns
+    -------
+    x, y, z : float
+        P - c_q, in the unit of `points`.
+    """
     centre = np.empty(3)
     rows = _exact_rows(cell, q, n, points)
     numerator = np.empty(36864)
