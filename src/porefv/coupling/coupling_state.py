@@ -61,7 +61,17 @@ class CouplingState:
 
     @classmethod
     def of(cls, packing: Packing, free: int, scheme: str, drag_number: float | None) -> CouplingState:
-        """The state on the fresh mesh of a packing, with so many free pores whose pressure is zero."""
+        """The state on the fresh mesh of a packing, with so many free pores whose pressure is zero.
+
+        Parameters
+        ----------
+        packing : Packing
+            The grains and the box that the mesh is made from.
+        free : int
+            Number of free pores, f.
+        scheme, drag_number
+            As the attributes of the class.
+        """
         assert packing.box is not None  # a mesh has seen to it
         corners = np.stack([packing.box.lower, packing.box.upper])
         pressure, rate = np.zeros((2, free))

@@ -188,6 +188,22 @@ def read(path: str | PathLike[str], name: str) -> Arrays:
 def header_of(content: Arrays, path: str | PathLike[str], name: str, newest: int) -> dict[str, Any]:
     """The header of a file of the format of that name, up to its newest version.
 
+    Parameters
+    ----------
+    content : dict of str to array
+        Everything in the file, as `read` returns it.
+    path : path
+        Of the file, for the messages of errors.
+    name : str
+        Of the format.
+    newest : int
+        The newest version of the format that can be read.
+
+    Returns
+    -------
+    dict
+        Entries of the header by name: format, version, porefv and those that were given to `header`.
+
     Raises
     ------
     InputError

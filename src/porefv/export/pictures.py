@@ -31,7 +31,21 @@ _GRAIN, _SECTION, _INK, _FLOW = "#d9d4cc", "#ece8e1", "#222222", "#1f5a99"
 def flow_picture(
     flow: PoreFlow, *, forces: bool = True, title: str = "", size: tuple[int, int] = SIZE
 ) -> pyvista.Plotter:
-    """The `picture` of a flow, whose pressures and, if asked for, forces are computed if they are not yet."""
+    """The `picture` of a flow, whose pressures and, if asked for, forces are computed if they are not yet.
+
+    Parameters
+    ----------
+    flow : PoreFlow
+    forces : bool
+        Colour the grains by the force on them.
+    title, size
+        As for `picture`.
+
+    Returns
+    -------
+    pyvista.Plotter
+        As of `picture`.
+    """
     pv = load_pyvista()
     data = {"total_force": flow.forces.total} if forces else {}
     spheres = pv.PolyData(spheres_polydata(flow.mesh.packing, **data))

@@ -57,7 +57,22 @@ class Contact:
 def contacts(
     centres: np.ndarray, radii: np.ndarray, lower: np.ndarray, upper: np.ndarray, delta: float
 ) -> list[Contact]:
-    """Contacts to regularise: gaps narrower than 2 δ r (δ r to a wall), overlaps up to `CEMENTED`."""
+    """Contacts to regularise: gaps narrower than 2 δ r (δ r to a wall), overlaps up to `CEMENTED`.
+
+    Parameters
+    ----------
+    centres, radii : (n, 3), (n,) float arrays
+        Of the spheres, in any unit of length.
+    lower, upper : (3,) float arrays
+        Corners of the box, in the same unit.
+    delta : float
+        δ, over the radius of the smaller sphere.
+
+    Returns
+    -------
+    list of Contact
+        Lengths in the unit of the arguments.
+    """
     n = len(radii)
     places = Box(lower, upper).wall_places
     found = []
@@ -93,7 +108,14 @@ def fluid_body(
 ) -> CSGeometry:
     """The box less its spheres, surfaces named `wall0` ... `wall5` and `solid`.
 
-    Spheres may reach beyond the box, which cuts them. Elements on a sphere are `mesh_size` of its radius at most.
+    Parameters
+    ----------
+    centres, radii, lower, upper, delta
+        As for `contacts`. Spheres may reach beyond the box, which cuts them.
+    regularisation : {'caps', 'bridges'}
+        What closes off the contacts: see the module.
+    mesh_size : float
+        Largest size of elements on a sphere, over its radius.
     """
     from netgen.csg import CSGeometry, Pnt, Sphere
 

@@ -86,6 +86,13 @@ def fluid_mesh(
 ) -> FluidMesh:
     """Mesh of the box less its spheres; `mesh_size` is the size of elements on a sphere over its radius.
 
+    Parameters
+    ----------
+    centres, radii, lower, upper, delta, regularisation, mesh_size
+        As for `porefv.resolved.fluid_geometry.fluid_body`.
+    order : int
+        Of the polynomials that bend the elements.
+
     Raises
     ------
     ComputationError

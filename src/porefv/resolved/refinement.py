@@ -69,6 +69,23 @@ def stokes_reference(
     extrapolated to δ = 0 by the known exponent; error bars are the difference between the meshes plus half of what the
     extrapolation adds.
 
+    Parameters
+    ----------
+    mesh : PoreMesh
+        Its packing and box bound the fluid; values are read off on its facets and cells.
+    walls : Walls
+        At least one must have a pressure.
+    viscosity : float
+        Dynamic viscosity of the fluid [Pa s].
+    options : Options, optional
+        How finely to resolve; `Options()` by default.
+    name : str
+        Name of the reference that is returned.
+    progress : Progress, optional
+        Has the stages `STAGES`; quiet by default.
+    threads : int
+        Number of threads that NGSolve uses.
+
     Raises
     ------
     MissingExtraError

@@ -126,7 +126,22 @@ def save(
     scene: str | None = None,
     packing: str | None = None,
 ) -> None:
-    """Compute, stage by stage, and write into an empty folder; without a flow, the mesh alone."""
+    """Compute, stage by stage, and write into an empty folder; without a flow, the mesh alone.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists, and is empty.
+    mesh : PoreMesh
+    flow : PoreFlow or None
+        None: the mesh alone.
+    quantities, vtk
+        As for `write`.
+    progress : Progress, optional
+        Has the stages that `stages` returns; quiet by default.
+    scene, packing : str, optional
+        Names of the files, for summary.json.
+    """
     progress = progress or Progress(quiet=True)
     with progress.stage("triangulation"):
         mesh.n_pores  # noqa: B018 - computed here

@@ -38,7 +38,18 @@ PROFILE_COLUMNS = ("step", "time", "stage", "layer", "lower", "upper", "pressure
 
 
 def grain_row(dem: DEM, coupling: Coupling | None, sizes: np.ndarray, residual: float) -> dict[str, float]:
-    """`GRAIN_COLUMNS` but for the stage; `sizes` (3,) are the box's that strains refer to [m]."""
+    """`GRAIN_COLUMNS` but for the stage; `sizes` (3,) are the box's that strains refer to [m].
+
+    Parameters
+    ----------
+    dem : DEM
+    coupling : Coupling or None
+        None: without a fluid.
+    sizes : (3,) float array
+        See above.
+    residual : float
+        What `momentum_residual` returns of the last step; NaN before the first.
+    """
     stress, energies = dem.wall_stress, dem.energies
     row: dict[str, float] = {"step": dem.steps, "time": dem.time}
     row |= {f"place_{wall}": place for wall, place in zip(WALLS, dem.places.tolist(), strict=True)}
@@ -130,7 +141,18 @@ def unbalanced(dem: DEM, coupling: Coupling | None) -> float:
 
 
 def profile_rows(dem: DEM, coupling: Coupling | None, axis: int, layers: int) -> list[dict[str, float]]:
-    """`PROFILE_COLUMNS` of each layer, but for the stage; layers are equally thick, across an axis of the box now."""
+    """`PROFILE_COLUMNS` of each layer, but for the stage; layers are equally thick, across an axis of the box now.
+
+    Parameters
+    ----------
+    dem : DEM
+    coupling : Coupling or None
+        None: without a fluid; pressures are NaN.
+    axis : int
+        Across which the layers lie: 0, 1 or 2.
+    layers : int
+        Number of layers.
+    """
     edges = np.linspace(dem.box.lower[axis], dem.box.upper[axis], layers + 1)
     pressures = np.full(layers, np.nan)
     if coupling is not None:
@@ -170,7 +192,22 @@ def layer_stresses(dem: DEM, axis: int, edges: np.ndarray) -> np.ndarray:
 
 
 def permeability(dem: DEM, axis: int, slip: np.ndarray, conductance: ConductanceModel) -> float:
-    """Of the grains where they stand, by steady flow along an axis; `slip` (6,) of the walls [m²]."""
+    """Of the grains where they stand, by steady flow along an axis; `slip` (6,) of the walls [m²].
+
+    Parameters
+    ----------
+    dem : DEM
+    axis : int
+        Along which the fluid flows: 0, 1 or 2.
+    slip : (6,) bool array
+        Walls that do not drag the fluid.
+    conductance : ConductanceModel
+
+    Returns
+    -------
+    float
+        Permeability [m²].
+    """
     walls = {name: Wall(slip=bool(slips)) for name, slips in zip(WALLS, slip, strict=True)}
     for end, pressure in enumerate((1.0, 0.0)):
         wall = 2 * axis + end

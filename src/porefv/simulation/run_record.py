@@ -109,7 +109,18 @@ class RunRecord:
         self, directory: Path, dem: DEM, coupling: Coupling | None, ended: bool, sizes: dict[str, int],
         frames: dict[int, float],
     ) -> None:  # fmt: skip
-        """Write a checkpoint. Until all of it is there, the record tells of the one before."""
+        """Write a checkpoint. Until all of it is there, the record tells of the one before.
+
+        Parameters
+        ----------
+        directory : Path
+            Of the results. Older checkpoints there are removed.
+        dem : DEM
+        coupling : Coupling or None
+            None: the state is that of the grains alone.
+        ended, sizes, frames
+            As the attributes of `CheckpointRecord`; those of `frames` are times [s].
+        """
         file = f"checkpoint_{dem.steps:09d}.npz"
         if coupling is not None:
             coupled_checkpoint.save(coupling, directory / file)

@@ -134,6 +134,17 @@ def conjugate_gradients(
 ) -> tuple[np.ndarray, int]:
     """Iterate until Σ|b - A x| is below `tolerance` times the flow, or rounding allows no better.
 
+    Parameters
+    ----------
+    network : Network
+    rhs : (n,) float64 array
+        b, the flux into each node [m³/s].
+    preconditioner : Preconditioner
+        Approximate inverse of the network's matrix A.
+    tolerance : float
+    guess : (n,) float64 array, optional
+        Pressures where iterations start, zero by default; they are copied [Pa].
+
     Returns
     -------
     x (n,), number of iterations

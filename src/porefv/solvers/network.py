@@ -69,8 +69,17 @@ class Network:
     ) -> Network:
         """From links (t, 2), their weights (t,) and the leaks (n,) of the nodes; parallel links stay apart.
 
-        Links join nodes, or things whose node is `number`; those with a negative number at one end are left out, as
-        are those without weight.
+        Parameters
+        ----------
+        pairs : (t, 2) int array
+            What each link joins: nodes, or things whose node is `number`. Links with a negative number at one end are
+            left out.
+        weights : (t,) float64 array
+            Weight of each link; links without weight are left out [m³/(Pa s)].
+        leaks : (n,) float64 array
+            As the attribute of the class [m³/(Pa s)].
+        number : (k,) int32 array, optional
+            Node of each of the k things that `pairs` names, negative for none. By default these are the nodes.
         """
         if number is None:
             number = np.arange(len(leaks), dtype=np.int32)
@@ -102,7 +111,22 @@ class Network:
         return out
 
     def split_residual(self, held: np.ndarray, sources: np.ndarray, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        """b - A (x + rest), b = leaks held + sources: from differences of both parts of the pressures."""
+        """b - A (x + rest), b = leaks held + sources: from differences of both parts of the pressures.
+
+        Parameters
+        ----------
+        held : (n,) float64 array
+            Pressure that each node's leaks lead to [Pa].
+        sources : (n,) float64 array
+            Volume injected into each node per unit time [m³/s].
+        x, rest : (n,) float64 arrays
+            Pressure of each node, and what rounding has left of it [Pa].
+
+        Returns
+        -------
+        (n,) float64 array
+            Imbalance of each node [m³/s].
+        """
         out = np.empty(len(self))
         split_residual(self.rows, held, sources, x, rest, out)
         return out

@@ -27,7 +27,18 @@ def is_finite_number(value: object) -> bool:
 
 
 def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
-    """InputError unless the value is a finite number for which that holds."""
+    """InputError unless the value is a finite number for which that holds.
+
+    Parameters
+    ----------
+    value : object
+    name : str
+        Of the value, for the message.
+    what : str
+        What the value must be, for the message.
+    holds : function
+        Takes the value, a finite number, and returns whether it is allowed.
+    """
     if not (is_finite_number(value) and holds(value)):  # type: ignore[arg-type]
         raise InputError(f"{name} must be {what}, not {value!r}")
 

@@ -41,7 +41,17 @@ def two_product(a, b):
 
 @njit(cache=True)
 def add(e, ne, f, nf, h):
-    """Sum of two expansions into `h` (room for ne + nf; neither input may share memory with it)."""
+    """Sum of two expansions into `h` (room for ne + nf; neither input may share memory with it).
+
+    Parameters
+    ----------
+    e, f : float64 arrays
+        The expansions.
+    ne, nf : int
+        Number of components of each.
+    h : float64 array
+        Is overwritten with the sum.
+    """
     i = 0
     j = 0
     n = 0
@@ -71,7 +81,18 @@ def add(e, ne, f, nf, h):
 
 @njit(cache=True)
 def scale(e, ne, b, h):
-    """Product of an expansion and a double into `h` (room for 2 ne)."""
+    """Product of an expansion and a double into `h` (room for 2 ne).
+
+    Parameters
+    ----------
+    e : float64 array
+        The expansion.
+    ne : int
+        Number of its components.
+    b : float
+    h : float64 array
+        Is overwritten with the product; shares no memory with `e`.
+    """
     if ne == 0 or b == 0.0:
         return 0
     n = 0
@@ -97,7 +118,17 @@ def scale(e, ne, b, h):
 
 @njit(cache=True)
 def multiply(e, ne, f, nf, h):
-    """Product of two expansions into `h` (room for 2 ne nf)."""
+    """Product of two expansions into `h` (room for 2 ne nf).
+
+    Parameters
+    ----------
+    e, f : float64 arrays
+        The expansions.
+    ne, nf : int
+        Number of components of each.
+    h : float64 array
+        Is overwritten with the product; shares no memory with `e` and `f`.
+    """
     if ne < nf:
         e, ne, f, nf = f, nf, e, ne
     if nf == 0:
