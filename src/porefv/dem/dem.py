@@ -12,16 +12,7 @@ from porefv.dem.contacts import StepParameters
 from porefv.dem.grain_state import GrainState
 from porefv.dem.material import Material
 from porefv.dem.measurements import Contacts, Energies, contact_loads
-from porefv.dem.motion import (
-    CROWDED,
-    FORCES,
-    MOTION,
-    RUNAWAY,
-    WHOLE,
-    Loads,
-    advance,
-    free_motion,
-)
+from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, Loads, advance, free_motion
 from porefv.dem.pair_listing import list_pairs, set_stiffness
 from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
@@ -290,11 +281,9 @@ class DEM:
         return taken
 
     def _parameters(self) -> StepParameters:
-        material = self.material
-        return StepParameters(
-            self.step, material.stiffness_ratio, material.friction, self.gravity, float(self.damping), _GAIN,
-            self.fastest,
-        )  # fmt: skip
+        # Integers among them would compile the kernels anew.
+        step, ratio, friction = float(self.step), float(self.material.stiffness_ratio), self.material.friction
+        return StepParameters(step, ratio, friction, self.gravity, float(self.damping), _GAIN, self.fastest)
 
     @property
     def moved_since_listing(self) -> float:
