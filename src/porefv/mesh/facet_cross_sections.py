@@ -45,7 +45,18 @@ class CrossSections(NamedTuple):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def facet_cross_sections(facets, laguerre_vertices, vertices, found):
-    """Fill the `CrossSections` of the facets (`FacetTopology`); `laguerre_vertices` (m, 3) are those of the cells."""
+    """Fill the `CrossSections` of the facets (`FacetTopology`); `laguerre_vertices` (m, 3) are those of the cells.
+
+    Parameters
+    ----------
+    facets : FacetTopology
+    laguerre_vertices : (m, 3) float64 array
+        Laguerre vertex of each cell, from the local origin [m].
+    vertices : Vertices
+        Spheres and walls that are the vertices of the cells.
+    found : CrossSections
+        Arrays to fill.
+    """
     for f in prange(facets.cells.shape[0]):
         _cross_section(f, facets, laguerre_vertices, vertices, found)
 

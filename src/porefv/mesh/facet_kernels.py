@@ -72,7 +72,15 @@ class Frame(NamedTuple):
 
 @njit(cache=True)
 def spheres_first(a, b, c, n):
-    """The three vertices turned, in cyclic order, until the spheres, which are below n, come first."""
+    """The three vertices turned, in cyclic order, until the spheres, which are below n, come first.
+
+    Parameters
+    ----------
+    a, b, c : int
+        Vertices of a facet.
+    n : int
+        Number of spheres; the vertex of wall w is n + w.
+    """
     while a >= n or (b >= n and c < n):
         a, b, c = b, c, a
     return a, b, c
@@ -80,7 +88,17 @@ def spheres_first(a, b, c, n):
 
 @njit(cache=True)
 def enumerate_facets(cells, neighbours, n, facets):
-    """Fill the `FacetTopology` with the facets between cells t < u, in the order of t; n is the number of spheres."""
+    """Fill the `FacetTopology` with the facets between cells t < u, in the order of t; n is the number of spheres.
+
+    Parameters
+    ----------
+    cells, neighbours : (m, 4) int32 arrays
+        Vertices of each cell, and the cell across the facet opposite to each of them, -1 where there is none.
+    n : int
+        Number of spheres.
+    facets : FacetTopology
+        Arrays to fill.
+    """
     f = 0
     for t in range(cells.shape[0]):
         for i in range(4):
@@ -106,7 +124,14 @@ def enumerate_facets(cells, neighbours, n, facets):
 
 @njit(cache=True)
 def facet_frame(a, b, c, vertices):
-    """`Frame` of the facet with these vertices, spheres first."""
+    """`Frame` of the facet with these vertices, spheres first.
+
+    Parameters
+    ----------
+    a, b, c : int
+        Vertices of the facet, spheres first.
+    vertices : Vertices
+    """
     ab = towards(a, b, vertices)
     ac = towards(a, c, vertices)
     cross = cross_product(ab, ac)
@@ -132,7 +157,14 @@ def area_factor(frame, vertices):
 
 @njit(cache=True)
 def area_vector(a, b, c, vertices):
-    """Area vector of a facet: triangle, trapezoid or rectangle [m²]."""
+    """Area vector of a facet: triangle, trapezoid or rectangle [m²].
+
+    Parameters
+    ----------
+    a, b, c : int
+        Vertices of the facet, spheres first.
+    vertices : Vertices
+    """
     frame = facet_frame(a, b, c, vertices)
     return times(area_factor(frame, vertices), frame.cross)
 
@@ -151,7 +183,14 @@ def facet_angles(frame, n):
 
 @njit(cache=True)
 def centroid(a, b, c, vertices):
-    """Centroid of a facet, from the local origin [m]."""
+    """Centroid of a facet, from the local origin [m].
+
+    Parameters
+    ----------
+    a, b, c : int
+        Vertices of the facet, spheres first.
+    vertices : Vertices
+    """
     if c < vertices.n_spheres:
         s, t = 1.0 / 3.0, 1.0 / 3.0
     elif b < vertices.n_spheres:  # a trapezoid over the edge ab, its sides ha and hb

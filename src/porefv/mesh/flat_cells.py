@@ -17,6 +17,14 @@ def settle_flat_cells(cells, neighbours, vertices, laguerre_vertices):
     A square of spheres that rounding has bent is two pairs of triangles with a flat cell between them. Its vertex may
     lie anywhere on the line through the square's middle, by rounding alone; with a neighbour's, which lies there too,
     the passage through the square is whole, as it is in the exact square.
+
+    Parameters
+    ----------
+    cells, neighbours : (m, 4) int32 arrays
+        Vertices of each cell, and the cell across the facet opposite to each of them, -1 where there is none.
+    vertices : Vertices
+    laguerre_vertices : (m, 3) float64 array
+        Changed in place [m].
     """
     flat = np.zeros(cells.shape[0], np.bool_)
     count = 0

@@ -31,6 +31,18 @@ def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
 
     On walls with slip, (6,) bool, a circle is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that
     of the circle, its tangency to the other two is linear in ρ and to the first quadratic.
+
+    Parameters
+    ----------
+    facet_vertices : (f, 3) int32 array
+        Vertices of each facet, spheres first.
+    vertices : Vertices
+    slip : (6,) bool array
+        Walls of symmetry.
+    radii : (f,) float64 array
+        To fill; 0 where there is no circle [m].
+    centres : (f, 3) float64 array
+        To fill, from the local origin [m].
     """
     n, points, sizes = vertices
     for f in prange(facet_vertices.shape[0]):
@@ -75,7 +87,17 @@ def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
 
 @njit(cache=True, parallel=True)
 def circle_portions(facet_vertices, vertices, circles, portions):
-    """Fill `portions` (f,) with the part of each circle's area that lies within the facet; 0 for a radius of zero."""
+    """Fill `portions` (f,) with the part of each circle's area that lies within the facet; 0 for a radius of zero.
+
+    Parameters
+    ----------
+    facet_vertices : (f, 3) int32 array
+        Vertices of each facet, spheres first.
+    vertices : Vertices
+    circles : Circles
+    portions : (f,) float64 array
+        To fill.
+    """
     n = vertices.n_spheres
     radii = circles.radii
     for f in prange(facet_vertices.shape[0]):

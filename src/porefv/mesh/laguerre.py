@@ -11,7 +11,18 @@ from porefv.system.kernels import njit
 
 @njit(cache=True)
 def crosses_laguerre_plane(k, m, u, vertices):
-    """Whether sphere k reaches beyond its Laguerre plane towards vertex m, to which u leads."""
+    """Whether sphere k reaches beyond its Laguerre plane towards vertex m, to which u leads.
+
+    Parameters
+    ----------
+    k : int
+        A sphere.
+    m : int
+        Another sphere, or a wall.
+    u : tuple of three floats
+        From k to m [m].
+    vertices : Vertices
+    """
     sizes = vertices.sizes
     if m >= vertices.n_spheres:
         return wall_distance(k, m, vertices) < sizes[k]
@@ -23,6 +34,16 @@ def laguerre_plane_distances(k, m, u, vertices):
     """Distances of centres k and m from the Laguerre plane between them, each within its radius [m].
 
     u leads from k to m. Of a wall, the second distance has no meaning.
+
+    Parameters
+    ----------
+    k : int
+        A sphere.
+    m : int
+        Another sphere, or a wall.
+    u : tuple of three floats
+        From k to m [m].
+    vertices : Vertices
     """
     sizes = vertices.sizes
     r = sizes[k]

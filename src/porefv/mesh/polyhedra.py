@@ -124,6 +124,14 @@ def polygons(
     """Points (p, 3) and corners (f, 4) of facets and wall faces, padded with -1.
 
     A corner is the image of a sphere on some walls: its own centre, swept to a wall, an edge or a corner of the box.
+
+    Parameters
+    ----------
+    mesh : CellMesh
+    facets : (k,) int array
+        Facets between cells.
+    face_cells, face_walls : (w,) int arrays
+        Cell and wall of each wall face.
     """
     n = mesh.n_spheres
     cells = mesh.cells[face_cells]

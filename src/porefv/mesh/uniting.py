@@ -16,6 +16,15 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
     They are no further apart than `tolerance` times the smallest radius of the facet's spheres.
 
     Labels follow the order of the cells.
+
+    Parameters
+    ----------
+    facets : FacetTopology
+    laguerre_vertices : (m, 3) float64 array
+        Laguerre vertex of each cell, from the local origin [m].
+    vertices : Vertices
+    tolerance : float
+        Relative to the smallest radius of the facet's spheres.
     """
     parent = np.arange(laguerre_vertices.shape[0], dtype=np.int32)
     for f in range(facets.cells.shape[0]):

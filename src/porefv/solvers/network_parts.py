@@ -45,7 +45,18 @@ def separator_numbers(network, bounds):
 
 @njit(cache=True, nogil=True)
 def part_of_network(network, separator, local, first, last):
-    """The part of the nodes first ... last - 1; `local` (n,) is given, for the numbers of the inner nodes in it."""
+    """The part of the nodes first ... last - 1; `local` (n,) is given, for the numbers of the inner nodes in it.
+
+    Parameters
+    ----------
+    network : NetworkRows
+    separator : (n,) int array
+        Number of each node in the separator, negative for nodes of parts.
+    local : (n,) int array
+        To fill, with the number of each inner node within the part.
+    first, last : int
+        The part has the nodes first ... last - 1.
+    """
     starts, columns, links, leaks = network
     inner = np.empty(last - first, np.int32)
     n_inner = 0

@@ -68,7 +68,17 @@ def rows_from(factor, n_inner):
 
 @njit(cache=True, error_model="numpy")
 def substitute(factor, r, z, y):
-    """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z."""
+    """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z.
+
+    Parameters
+    ----------
+    factor : named tuple of arrays
+        Order of the nodes, and the columns of L and D.
+    r : (n,) float64 array
+        Right-hand side.
+    z, y : (n,) float64 arrays
+        To fill: the result, and what lies between the two substitutions.
+    """
     order, starts, rows, factors, _ = factor
     n = order.shape[0]
     for k in range(n):
@@ -82,7 +92,21 @@ def substitute(factor, r, z, y):
 
 @njit(cache=True, parallel=True)
 def substitute_parts(parts, factor, separator_rows, r, z, y):
-    """The same, parts side by side."""
+    """The same, parts side by side.
+
+    Parameters
+    ----------
+    parts : (p + 1,) int array
+        Where each part begins in the order of the factor, and where the last ends.
+    factor : named tuple of arrays
+        Order of the nodes, and the columns of L and D.
+    separator_rows : named tuple of arrays
+        Rows of L of the separator's nodes.
+    r : (n,) float64 array
+        Right-hand side.
+    z, y : (n,) float64 arrays
+        To fill: the result, and what lies between the two substitutions.
+    """
     order, starts, rows, factors, _ = factor
     row_starts, row_columns, row_factors = separator_rows
     n = order.shape[0]

@@ -80,7 +80,17 @@ def cells_used(work: Workspace) -> int:
 
 @njit(cache=True)
 def start(q, vertices, triangulation, work, scale):
-    """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box."""
+    """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box.
+
+    Parameters
+    ----------
+    q : int
+        The sphere.
+    vertices : Vertices
+    triangulation : Cells
+    work : Workspace
+    scale : Scale
+    """
     n = vertices.n_spheres
     cells, neighbours, _, _ = triangulation
     for corner in range(8):
@@ -104,7 +114,19 @@ def start(q, vertices, triangulation, work, scale):
 
 @njit(cache=True, nogil=True)
 def insert(order, first, vertices, triangulation, work, scale):
-    """Insert the spheres order[first:] into `Cells`; returns how many were done (fewer where the arrays are full)."""
+    """Insert the spheres order[first:] into `Cells`; returns how many were done (fewer where the arrays are full).
+
+    Parameters
+    ----------
+    order : (n,) int array
+        Spheres in the order of their insertion.
+    first : int
+        Place in `order` at which to go on.
+    vertices : Vertices
+    triangulation : Cells
+    work : Workspace
+    scale : Scale
+    """
     _, points, weights = vertices
     cells, neighbours, planes, bounds = triangulation
     marks, ends, free, counts = work

@@ -68,7 +68,18 @@ def row(v, q, vertices):
 
 @njit(cache=True)
 def side(cell, i, q, vertices):
-    """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i."""
+    """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i.
+
+    Parameters
+    ----------
+    cell : (4,) int array
+        Its vertices.
+    i : int
+        Place of a vertex in it.
+    q : int
+        A sphere.
+    vertices : Vertices
+    """
     j, k, m = _others(i)
     a, _, _ = row(cell[j], q, vertices)
     b, _, _ = row(cell[k], q, vertices)
