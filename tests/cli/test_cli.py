@@ -71,7 +71,7 @@ def test_solve_overwrites_only_by_force(scene, capsys):
 def test_check_tells_what_was_found_and_writes_nothing(scene, capsys):
     assert main(["check", str(scene)]) == 0
     out = capsys.readouterr().out
-    assert "scene.toml is sound" in out
+    assert "scene.toml has no errors" in out
     assert "25 spheres, radii 0.111 to 0.2078 m" in out
     assert "y_min: 1 Pa, no-slip" in out
     assert "--force" not in out

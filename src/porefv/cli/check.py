@@ -87,4 +87,4 @@ def scene_text(scene: FlowScene, packing: Packing) -> str:
     free = available()
     needed = f"about {required(len(packing)) / 2**30:.1f} GiB at the most"
     rows.append(("memory", needed if free is None else f"{needed}, {free / 2**30:.1f} GiB free"))
-    return "\n".join([f"{path_text(scene.path or 'scene')} is sound", *rows_text(rows)])
+    return "\n".join([f"{path_text(scene.path or 'scene')} has no errors", *rows_text(rows)])

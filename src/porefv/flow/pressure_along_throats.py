@@ -2,8 +2,9 @@
 
 A pore's part of a throat is the pyramid from the throat's facet to the pore's Laguerre vertex. It cuts a patch from
 each of the facet's spheres, a spherical triangle. One pressure for all of a pore (C12 eq. 14) leaves the whole of the
-fall in the facet's plane; here pressure depends on the height s over that plane, as friction in the sections of a
-hyperboloid has it: what is left of the drop from the vertex at height h to the neck is
+fall in the facet's plane. Here the pressure depends on the height s over that plane, as friction in the sections of a
+hyperboloid has it. Of the drop between the vertex, at height h, and the neck, at height 0, the part that is lost above
+the height s is
 
     1 - Φ(s) / Φ(h),    Φ(s) = t - t³/3,    t = x / √(1 + x²),    x = β s / e,
 
