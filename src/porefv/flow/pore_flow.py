@@ -1,4 +1,4 @@
-"""PoreFlow: steady viscous flow through the pores of a fixed packing, each quantity computed when asked for.
+"""PoreFlow: steady viscous flow through the pores of a fixed packing, each quantity computed when it is first needed.
 
 The functions that it calls can be used without it: `throat_conductances`, `solve_pressure`, `fluxes`,
 `acting_pressure`, `grain_forces`, `pore_velocities`.
@@ -271,8 +271,8 @@ class PoreFlow(FixedInputs):
     def closing_error(self) -> float:
         """Part of the flow that is missing, at most, because throats are closed that may be open; between 0 and 1.
 
-        Throats without conductance that their spheres do not cover are closed for want of a better answer: A^f, φ or Σγ
-        came out as zero or less. None is more open than a round hole of all its area A in a thin plate, q = a³ Δp / 3μ
+        Throats without conductance that their spheres do not cover are closed because A^f, φ or Σγ came out as zero
+        or less. None is more open than a round hole of all its area A in a thin plate, q = a³ Δp / 3μ
         with π a² = A (Sampson 1891), and by Dirichlet's principle the pressures found without them bound from above
         what power flows would take with them. Between two walls power is in proportion to permeability: with all
         of them open it is k / (1 - closing_error) at most.

@@ -46,7 +46,7 @@ class WallFaces:
 class CellMesh(FixedInputs):
     """Cells of the regular triangulation of a packing: tetrahedra, wedges and hexahedra that fill the box.
 
-    A cell is the centres of its spheres, swept to its walls. Everything is computed when first asked for.
+    A cell is the centres of its spheres, swept to its walls. Everything is computed when it is first needed.
 
     Parameters
     ----------

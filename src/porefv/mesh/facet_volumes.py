@@ -91,9 +91,9 @@ def facet_volumes(facets, laguerre_vertices, vertices, volumes, surfaces):
         caps_bc = _caps(b, c, bc, bc, cross, from_b, vertices) if b < n else Caps(0.0, 0.0, 0.0)
         caps_ca = _caps(a, c, ac, times(-1.0, ac), cross, from_a, vertices)
         # A L as S·(P_j - P_i), S being the area vector, so that sums over facets telescope.
-        prism = area_factor(frame, vertices) * (from_a.hj - from_a.hi)
-        outside = (prism - gamma_a * sizes[a] - gamma_b * sizes[b] - gamma_c * sizes[c]) / 3.0
-        volumes[f] = outside + caps_ab.volume + caps_bc.volume + caps_ca.volume
+        area_times_length = area_factor(frame, vertices) * (from_a.hj - from_a.hi)
+        outside_balls = (area_times_length - gamma_a * sizes[a] - gamma_b * sizes[b] - gamma_c * sizes[c]) / 3.0
+        volumes[f] = outside_balls + caps_ab.volume + caps_bc.volume + caps_ca.volume
         surfaces[f, 0] = gamma_a - caps_ab.of_k - caps_ca.of_k
         surfaces[f, 1] = gamma_b + 0.5 * length * on_b - caps_ab.of_m - caps_bc.of_k
         surfaces[f, 2] = gamma_c + 0.5 * length * on_c - caps_bc.of_m - caps_ca.of_m

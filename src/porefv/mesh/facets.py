@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Facets(FixedInputs):
-    """Facets between the cells of a mesh, one row each; everything is computed when first asked for.
+    """Facets between the cells of a mesh, one row each; everything is computed when it is first needed.
 
     A facet is a triangle (three spheres), a trapezoid (two spheres and a wall) or a rectangle (one sphere and two
     walls). It is normal to the line between the Laguerre vertices P_i and P_j of its two cells.

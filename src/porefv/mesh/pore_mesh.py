@@ -37,7 +37,7 @@ class PoreCells(NamedTuple):
 class PoreMesh(CellMesh):
     """Pores of a packing: the cells of its regular triangulation, with those that share a Laguerre vertex united.
 
-    Everything is computed when first asked for.
+    Everything is computed when it is first needed.
 
     Parameters
     ----------
@@ -72,11 +72,11 @@ class PoreMesh(CellMesh):
 
     @lazy_property
     def _united(self) -> tuple[np.ndarray, np.ndarray]:
-        exact, asked = (
+        exact, united = (
             unite(self.facets.topology, self.local_vertices, self.cell_vertices, tolerance)
             for tolerance in (TIE_TOLERANCE, max(self.unite_tolerance, TIE_TOLERANCE))
         )
-        return exact, asked
+        return exact, united
 
     @property
     def cell_node(self) -> np.ndarray:

@@ -37,7 +37,7 @@ class Throats(FixedInputs):
     """Throats of a mesh: one row per Laguerre edge between two pores, dual to one facet.
 
     Facets that share their Laguerre edge (the triangles into which a tie cuts a polygon) are one throat. Facets
-    inside a united pore belong to no throat. Geometry that needs solid angles is computed only when asked for.
+    inside a united pore belong to no throat. Geometry that needs solid angles is computed only when it is needed.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
         if square <= (tolerance * radius) ** 2:
             join(parent, i, j)
     count = 0
-    for t in range(parent.shape[0]):  # a root comes before all that hang on it
+    for t in range(parent.shape[0]):  # a root comes before all below it
         if parent[t] == t:
             parent[t] = count
             count += 1

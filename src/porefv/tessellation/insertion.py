@@ -310,7 +310,7 @@ def _place(t, q, vertices, triangulation, scale):
     b, hb, tb = row(cells[t, k1], q, vertices)
     c, hc, tc = row(cells[t, k2], q, vertices)
     d, permanent = determinant(a, b, c)
-    # Cramer's rule: each minor and height carries a few ε of its permanent.
+    # Cramer's rule: each minor and height has an error of a few ε of its permanent.
     room = abs(d) - 8.0 * EPSILON * permanent
     error = np.inf
     size = 0.0

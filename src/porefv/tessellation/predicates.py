@@ -9,7 +9,7 @@ Rows of a cell (v0, v1, v2, v3), seen from the sphere q
     q is *in conflict* with the cell, f < 0, where Δ > 0.
 
 Each predicate is decided in floating point when an error bound allows it, else with expansions, and where
-the exact value is zero by symbolic perturbation: the weights r_k² are thought of as lowered by infinitesimals
+the exact value is zero by symbolic perturbation: the weights r_k² are regarded as lowered by infinitesimals
 of decreasing size, in lexicographic order of the centres (Edelsbrunner and Mücke 1990). The answer so
 depends on the packing alone, not on the order of its spheres or of their insertion.
 """

@@ -107,9 +107,9 @@ def _shift_parts(throats, lengths, facets, pores, vertices, laguerre_vertices, p
                     if k >= n or sizes[k] >= least:
                         continue
                     above = inward * dot(minus(vector_at(k, points), first), normal)
-                    wanted = LEAST_HEIGHT * (1.0 - sizes[k] / least) * above
-                    if above > 0.0 and height < wanted:
-                        part = demand * min(above / sizes[k], 1.0) * (wanted - height) / (above - height)
+                    least_height = LEAST_HEIGHT * (1.0 - sizes[k] / least) * above
+                    if above > 0.0 and height < least_height:
+                        part = demand * min(above / sizes[k], 1.0) * (least_height - height) / (above - height)
                         parts[c, i] = max(parts[c, i], part)
 
 
