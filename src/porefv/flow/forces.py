@@ -16,6 +16,7 @@ from porefv.flow.walls import Walls
 from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES
+from porefv.packing.overlaps import sphere_volumes
 from porefv.system.kernels import njit
 from porefv.system.number_checks import three_numbers
 
@@ -146,7 +147,7 @@ def grain_forces(
     # On two open ends the reference cancels, without rounding.
     thrust += -(WALL_NORMALS * walls.held[:, None]).sum(axis=0) * reference * sections
 
-    volumes = 4.0 / 3.0 * np.pi * mesh.packing.radii**3
+    volumes = sphere_volumes(mesh.packing.radii)
     weight = np.zeros(3) if weight is None else three_numbers(weight, "weight", "N/m³")
     spread = float(np.ptp(relative)) or float(np.abs(field.pressure).max()) or 1.0
     return Forces(
