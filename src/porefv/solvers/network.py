@@ -190,7 +190,16 @@ def _multiply(network, q, aq):
 
 @njit(cache=True, parallel=True)
 def residual(network, rhs, x, out):
-    """out = b - A x."""
+    """out = b - A x.
+
+    Parameters
+    ----------
+    network : NetworkRows
+    rhs, x : (n,) float64 arrays
+        b [m³/s], and the pressure of each node [Pa].
+    out : (n,) float64 array
+        To fill [m³/s].
+    """
     starts, columns, links, leaks = network
     for i in prange(leaks.shape[0]):
         s = rhs[i] - leaks[i] * x[i]
@@ -201,7 +210,16 @@ def residual(network, rhs, x, out):
 
 @njit(cache=True, parallel=True)
 def split_residual(network, held, sources, x, rest, out):
-    """out = leaks held + sources - A (x + rest)."""
+    """out = leaks held + sources - A (x + rest).
+
+    Parameters
+    ----------
+    network : NetworkRows
+    held, sources, x, rest : (n,) float64 arrays
+        As for `Network.split_residual`.
+    out : (n,) float64 array
+        To fill [m³/s].
+    """
     starts, columns, links, leaks = network
     for i in prange(leaks.shape[0]):
         s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
