@@ -122,13 +122,11 @@ def section_friction(which, throats, facets, vertices, ends, necks, slip, coeffi
 
     Returns
     -------
-    conductivity : (u,) array
-        0 without a fluid area [m⁴].
-    beyond : (u, 2) array
-        Part between the Laguerre vertex and the centre of the first pore, and of the second [-].
+    (3, u) array
+        Length over friction, 0 without a fluid area [m⁴]; the part of the friction between the Laguerre vertex and the
+        centre of the first pore, and of the second [-].
     """
-    conductivity = np.zeros(which.shape[0])
-    beyond = np.zeros((which.shape[0], 2))
+    found = np.zeros((3, which.shape[0]))
     for row in prange(which.shape[0]):
         t = which[row]
         if necks.areas[t] <= 0.0:
@@ -162,19 +160,19 @@ def section_friction(which, throats, facets, vertices, ends, necks, slip, coeffi
         begin, end = _span(f, facets, vertices, ends.centres, necks.lengths[t])
         first, last = _span(f, facets, vertices, ends.laguerre_vertices, necks.lengths[t])
         if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
-            conductivity[row] = 1.0 / _friction(abs(end), abs(end), sections, coefficients)
+            found[0, row] = 1.0 / _friction(abs(end), abs(end), sections, coefficients)
             continue
         total = 0.0
         if begin < 0.0:
             total += _between(max(-end, 0.0), -begin, sections, coefficients)
         if end > 0.0:
             total += _between(max(begin, 0.0), end, sections, coefficients)
-        conductivity[row] = STRETCH * necks.lengths[t] / total
+        found[0, row] = STRETCH * necks.lengths[t] / total
         if -begin > max(-first, -end, 0.0):
-            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, sections, coefficients) / total
+            found[1, row] = _between(max(-first, -end, 0.0), -begin, sections, coefficients) / total
         if end > max(last, begin, 0.0):
-            beyond[row, 1] = _between(max(last, begin, 0.0), end, sections, coefficients) / total
-    return conductivity, beyond
+            found[2, row] = _between(max(last, begin, 0.0), end, sections, coefficients) / total
+    return found
 
 
 @njit(cache=True)

@@ -70,7 +70,7 @@ class SectionFriction(ConductanceModel):
             throats.roundness(slip),
             throats.inscribed_circles(slip)[1],
         )
-        return section_friction(
+        found = section_friction(
             which,
             throats.facets_of_throats,
             mesh.facets.planes,
@@ -80,3 +80,4 @@ class SectionFriction(ConductanceModel):
             np.asarray(slip, bool),
             Coefficients(self.friction, self.curvature),
         )
+        return found[0], found[1:].T
