@@ -62,11 +62,20 @@ class Necks(NamedTuple):
     portions: np.ndarray
 
 
-class Coefficients(NamedTuple):
-    """Fitted coefficients of the friction: c₁ and c₂ of `SectionFriction` [-]."""
+class Drag(NamedTuple):
+    """What the friction in a section depends on besides its geometry.
+
+    Attributes
+    ----------
+    friction, curvature : float
+        c₁ and c₂ of `SectionFriction` [-].
+    slip : (6,) bool array
+        Walls of symmetry, without friction.
+    """
 
     friction: float
     curvature: float
+    slip: np.ndarray
 
 
 class Sections(NamedTuple):
@@ -90,6 +99,8 @@ class Sections(NamedTuple):
         λ^{3/2} [-].
     portion : float
         χ [-].
+    friction, curvature : float
+        c₁ and c₂ [-].
     """
 
     neck: float
@@ -101,11 +112,13 @@ class Sections(NamedTuple):
     doubling_height: float
     opening_factor: float
     portion: float
+    friction: float
+    curvature: float
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def section_friction(which, throats, facets, vertices, ends, necks, slip, coefficients):
-    """Length over friction of some throats, and the parts of their friction beyond the Laguerre vertices.
+def section_friction(which, throats, facets, vertices, ends, necks, drag, conductivity, beyond):
+    """Fill in length over friction of some throats, and the parts of their friction beyond the Laguerre vertices.
 
     Parameters
     ----------
@@ -116,19 +129,17 @@ def section_friction(which, throats, facets, vertices, ends, necks, slip, coeffi
     vertices : Vertices
     ends : Ends
     necks : Necks
-    slip : (6,) bool array
-        Walls of symmetry.
-    coefficients : Coefficients
-
-    Returns
-    -------
-    (3, u) array
-        Length over friction, 0 without a fluid area [m⁴]; the part of the friction between the Laguerre vertex and the
-        centre of the first pore, and of the second [-].
+    drag : Drag
+    conductivity : (u,) array
+        0 without a fluid area [m⁴].
+    beyond : (u, 2) array
+        Part between the Laguerre vertex and the centre of the first pore, and of the second [-].
     """
-    found = np.zeros((3, which.shape[0]))
     for row in prange(which.shape[0]):
         t = which[row]
+        conductivity[row] = 0.0
+        beyond[row, 0] = 0.0
+        beyond[row, 1] = 0.0
         if necks.areas[t] <= 0.0:
             continue
         start = throats.starts[t]
@@ -138,7 +149,7 @@ def section_friction(which, throats, facets, vertices, ends, necks, slip, coeffi
         on_walls = 0.0
         for i in range(count):
             f = throats.facets[start + i]
-            on_walls += _discs(f, facets, vertices, slip, radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3])
+            on_walls += _discs(f, facets, vertices, drag.slip, radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3])
         widest = radii.max()
         total_angle = angles.sum()
         mean = 0.0
@@ -155,24 +166,25 @@ def section_friction(which, throats, facets, vertices, ends, necks, slip, coeffi
             doubling_height=np.sqrt(2.0 * necks.areas[t] / total_angle),
             opening_factor=necks.roundness[t] ** 1.5,
             portion=necks.portions[t],
+            friction=drag.friction,
+            curvature=drag.curvature,
         )
         f = throats.facets[start]
         begin, end = _span(f, facets, vertices, ends.centres, necks.lengths[t])
         first, last = _span(f, facets, vertices, ends.laguerre_vertices, necks.lengths[t])
         if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
-            found[0, row] = 1.0 / _friction(abs(end), abs(end), sections, coefficients)
+            conductivity[row] = 1.0 / _friction(abs(end), abs(end), sections)
             continue
         total = 0.0
         if begin < 0.0:
-            total += _between(max(-end, 0.0), -begin, sections, coefficients)
+            total += _between(max(-end, 0.0), -begin, sections)
         if end > 0.0:
-            total += _between(max(begin, 0.0), end, sections, coefficients)
-        found[0, row] = STRETCH * necks.lengths[t] / total
+            total += _between(max(begin, 0.0), end, sections)
+        conductivity[row] = STRETCH * necks.lengths[t] / total
         if -begin > max(-first, -end, 0.0):
-            found[1, row] = _between(max(-first, -end, 0.0), -begin, sections, coefficients) / total
+            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, sections) / total
         if end > max(last, begin, 0.0):
-            found[2, row] = _between(max(last, begin, 0.0), end, sections, coefficients) / total
-    return found
+            beyond[row, 1] = _between(max(last, begin, 0.0), end, sections) / total
 
 
 @njit(cache=True)
@@ -211,7 +223,7 @@ def _discs(f, facets, vertices, slip, radii, angles):
 
 
 @njit(cache=True, error_model="numpy")
-def _friction(s, reach, sections, coefficients):
+def _friction(s, reach, sections):
     """Resistance of a unit of length at height s over the neck, on the way to a pore's centre at height `reach`."""
     growth = 0.0
     perimeter = sections.on_walls
@@ -226,12 +238,12 @@ def _friction(s, reach, sections, coefficients):
     area = sections.neck + (1.0 - NARROWING * s / reach) * growth if reach > 0.0 else sections.neck
     width = max(np.sqrt(area / (np.pi * sections.portion)), 2.0 * area / perimeter)
     opening = sections.opening_factor * width
-    c1, c2 = coefficients
+    c1, c2 = sections.friction, sections.curvature
     return (c1 * perimeter + 2.0 * c2 * area / sections.mean_radius) / (area * area * opening)
 
 
 @njit(cache=True, error_model="numpy")
-def _between(low, high, sections, coefficients):
+def _between(low, high, sections):
     """Friction between two heights, 0 <= low < high.
 
     From the neck to the poles of the widest sphere in t, s = r t (3 - t²) / 2, where the perimeter has no root, and
@@ -246,7 +258,7 @@ def _between(low, high, sections, coefficients):
         end = np.log(high / widest)
         for i in range(_NODES.shape[0]):
             s = widest * np.exp(begin + (end - begin) * _NODES[i])
-            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, sections, coefficients)
+            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, sections)
     if low >= widest:
         return total
     e = sections.doubling_height / widest
@@ -263,5 +275,5 @@ def _between(low, high, sections, coefficients):
         t = e * v / root
         rate = 1.5 * widest * (1.0 - t * t) * e / root**3
         s = 0.5 * widest * t * (3.0 - t * t)
-        total += span * _WEIGHTS[i] * rate * _friction(s, high, sections, coefficients)
+        total += span * _WEIGHTS[i] * rate * _friction(s, high, sections)
     return total

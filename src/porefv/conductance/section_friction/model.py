@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.conductance.model import ConductanceModel, DropBeyondVertices
-from porefv.conductance.section_friction.friction_kernels import Coefficients, Ends, Necks, section_friction
+from porefv.conductance.section_friction.friction_kernels import Drag, Ends, Necks, section_friction
 from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.errors import InputError
 from porefv.mesh.throats import Throats
@@ -70,14 +70,16 @@ class SectionFriction(ConductanceModel):
             throats.roundness(slip),
             throats.inscribed_circles(slip)[1],
         )
-        found = section_friction(
+        conductivity, beyond = np.empty(len(which)), np.empty((len(which), 2))
+        section_friction(
             which,
             throats.facets_of_throats,
             mesh.facets.planes,
             mesh.cell_vertices,
             ends,
             necks,
-            np.asarray(slip, bool),
-            Coefficients(self.friction, self.curvature),
+            Drag(self.friction, self.curvature, np.asarray(slip, bool)),
+            conductivity,
+            beyond,
         )
-        return found[0], found[1:].T
+        return conductivity, beyond
