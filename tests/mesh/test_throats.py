@@ -254,6 +254,15 @@ def test_solid_angles_wait_until_they_are_needed(reference, unit_flow, monkeypat
         _ = unit_flow(mesh, Walls.along("y"), HydraulicRadius()).permeability
 
 
+def test_area_of_a_facet_of_one_sphere_is_the_product_of_its_distances_from_two_walls_to_the_bit(mesh_of):
+    mesh = mesh_of("n2000_s1")
+    n, facets = mesh.n_spheres, mesh.facets
+    rectangles = np.flatnonzero(facets.vertices[:, 1] >= n)
+    sphere, *walls = facets.vertices[rectangles].T
+    to_b, to_c = (mesh.sizes[w] - (mesh.local_points[w] * mesh.local_points[sphere]).sum(axis=1) for w in walls)
+    np.testing.assert_array_equal(facets.areas[rectangles], to_b * to_c)
+
+
 # ---- inscribed circles ----------
 
 
