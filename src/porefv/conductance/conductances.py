@@ -9,7 +9,7 @@ from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.errors import InputError, counted
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
-from porefv.system.number_checks import check_number, ensure_finite
+from porefv.system.number_checks import check_number, ensure_finite, one_value_each
 
 
 def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarray, viscosity: float) -> np.ndarray:
@@ -37,16 +37,10 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
         If a conductance is not a finite number.
     """
     ensure_pore_mesh(mesh)
-    throats, slip = mesh.throats, np.asarray(slip, bool)
-    if slip.shape != (len(WALLS),):
-        raise InputError(f"slip must have one value per wall, (6,), not shape {slip.shape}")
+    throats, slip = mesh.throats, one_value_each(slip, len(WALLS), "wall", "slip", bool)
     check_number(viscosity, "viscosity", "a positive number of Pa s", lambda x: x > 0.0)
-    conductivity = np.asarray(ensure_model(model).conductivity(throats, slip), float)
-    if conductivity.shape != (len(throats),):
-        raise InputError(
-            f"the conductivity of the model {model.name} must have one value per throat, ({len(throats)},), not shape "
-            f"{conductivity.shape}"
-        )
+    conductivity = ensure_model(model).conductivity(throats, slip)
+    conductivity = one_value_each(conductivity, len(throats), "throat", f"the conductivity of the model {model.name}")
     lengths = viscosity * throats.effective_lengths
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
         conductances = np.divide(conductivity, lengths, out=lengths)
@@ -64,11 +58,7 @@ def ensure_pore_mesh(mesh: PoreMesh) -> None:
 def check_conductances(mesh: PoreMesh, conductances: ArrayLike) -> np.ndarray:
     """(t,) float array of conductances; InputError if the shape is another, or a value is negative or not finite."""
     ensure_pore_mesh(mesh)
-    found = np.asarray(conductances, float)
-    if found.shape != (len(mesh.throats),):
-        raise InputError(
-            f"conductances must have one value per throat, ({len(mesh.throats)},), not shape {found.shape}"
-        )
+    found = one_value_each(conductances, len(mesh.throats), "throat", "conductances")
     wrong = np.flatnonzero(~((found >= 0.0) & np.isfinite(found)))
     if len(wrong):
         raise InputError(

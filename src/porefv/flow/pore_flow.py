@@ -20,9 +20,9 @@ from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
 from porefv.flow.forces import Forces, grain_forces
+from porefv.flow.given_pressure import given_pressure
 from porefv.flow.pressure import (
     PressureField,
-    given_pressure,
     held_pressures,
     pores_of_several_pressures,
     reference_pressure,
@@ -119,7 +119,7 @@ class PoreFlow(FixedInputs):
         mesh : PoreMesh or Packing
         pressure : (n_pores,) array
             Piezometric pressure of each pore [Pa]. Pores on walls of imposed pressure must have that pressure, to
-            1e-6 of the range of the pressures.
+            1e-6 of the range of the imposed pressures.
         walls, fluid, conductance, gravity
             As of `PoreFlow`: those with which the pressure was found.
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from porefv.conductance.conductances import check_conductances
-from porefv.errors import ImbalanceWarning, InputError, counted
+from porefv.errors import InputError, counted
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.solvers.pressure_equation import reached, solve_network
+from porefv.solvers.pressure_equation import solve_network
 from porefv.solvers.solver import TOLERANCE, SolverReport
-
-# How far a given pressure may be from the imposed one of its pore, relative to the range of the imposed pressures.
-GIVEN_TOLERANCE = 1e-6
-# Imbalance of a given pressure, relative to the flow, up to which no warning is given.
-BALANCED = 1e-3
+from porefv.system.number_checks import one_value_each
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +69,7 @@ def as_field(mesh: PoreMesh, pressure: PressureField | np.ndarray) -> PressureFi
 
 def check_by_pore(mesh: PoreMesh, values: ArrayLike, what: str = "pressure") -> np.ndarray:
     """(n_pores,) float array; InputError if the shape is another, or a value is not finite."""
-    found = np.asarray(values, float)
-    if found.shape != (mesh.n_pores,):
-        raise InputError(f"{what} must have one value per pore, ({mesh.n_pores},), not shape {found.shape}")
+    found = one_value_each(values, mesh.n_pores, "pore", what)
     if not np.isfinite(found).all():
         bad = np.flatnonzero(~np.isfinite(found))
         raise InputError(
@@ -176,52 +169,3 @@ def solve_pressure(
         tolerance=tolerance,
     )
     return PressureField(reference, found.pressure, found.rest, found.isolated, found.report)
-
-
-def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarray, walls: Walls) -> PressureField:
-    """A pressure field found elsewhere, with the imbalance that it leaves.
-
-    Parameters
-    ----------
-    mesh : PoreMesh
-    conductances : (t,) array
-        K of each throat [m³/(Pa s)].
-    pressure : (n_pores,) array
-        Pressure of each pore; on walls of imposed pressure the imposed one, to `GIVEN_TOLERANCE` of their range [Pa].
-    walls : Walls
-
-    Raises
-    ------
-    InputError
-        For pressures of the wrong shape, not finite, or other than those imposed.
-    """
-    pressure = check_by_pore(mesh, pressure)
-    reference = reference_pressure(walls)
-    imposed = held_pressures(mesh, walls.pressures)
-    free = np.isnan(imposed)
-    known = imposed[~free]
-    span = float(np.ptp(known)) or float(np.ptp(pressure)) or abs(reference) or 1.0
-    wrong = np.flatnonzero(np.abs(pressure - imposed) > GIVEN_TOLERANCE * span)  # false for free pores, which have NaN
-    if len(wrong):
-        raise InputError(
-            f"{counted(len(wrong), 'pore')} on walls of imposed pressure have another pressure, the first of them "
-            f"pore {wrong[0]}: {pressure[wrong[0]]:.6g} Pa instead of {imposed[wrong[0]]:.6g} Pa; give the pressure of "
-            "every pore, those on the walls included"
-        )
-    relative = pressure - reference
-    pairs = mesh.throats.pores
-    i, j = pairs.T
-    isolated = ~reached(pairs, conductances, ~free)
-    flux = np.where(isolated[i] & isolated[j], 0.0, conductances * (relative[i] - relative[j]))
-    outflow = np.bincount(i, flux, mesh.n_pores) - np.bincount(j, flux, mesh.n_pores)
-    lost, through = float(np.abs(outflow[free]).sum()), 0.5 * float(np.abs(outflow[~free]).sum())
-    imbalance = lost / (through or float(np.abs(flux).sum()) or 1.0)
-    if imbalance > BALANCED:
-        warnings.warn(
-            f"the given pressure leaves {imbalance:.1e} of the flow out of balance: was it found with other "
-            "conductances than those of this flow?",
-            ImbalanceWarning,
-            stacklevel=3,
-        )
-    report = SolverReport("given", int(np.count_nonzero(free)), 0, 0.0, imbalance, 0.0, 0.0)
-    return PressureField(reference, relative, np.zeros(mesh.n_pores), isolated, report)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +52,14 @@ def three_numbers(values: ArrayLike, name: str, unit: str = "") -> NDArray[np.fl
         found = np.empty(0)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InputError(f"{name} must be three finite numbers{f' in {unit}' if unit else ''}, not {values!r}")
+    return found
+
+
+def one_value_each(values: ArrayLike, number: int, each: str, what: str, dtype: type = float) -> NDArray[Any]:
+    """The values as an array (number,), one for `each` wall, pore or throat; InputError if they are not so many."""
+    found: NDArray[Any] = np.asarray(values, dtype)
+    if found.shape != (number,):
+        raise InputError(f"{what} must have one value per {each}, ({number},), not shape {found.shape}")
     return found
 
 
