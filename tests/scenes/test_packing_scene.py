@@ -174,7 +174,9 @@ def test_the_terminal_shows_stress_porosity_and_unbalanced_force(monkeypatch):
     shown = []
     monkeypatch.setattr(Progress, "show", lambda progress, state: shown.append(state))
     scene = PackingScene.from_mapping(tomllib.loads(GROWTH.replace("number = 50", "number = 30")))
-    scene.make(Progress(("packing", "writing"), quiet=True))
+    progress = Progress(("packing", "writing"), quiet=True)
+    progress.draws = True
+    scene.make(progress)
     assert re.fullmatch(r"pressing \S+ Pa, n 0\.\d{4}, unbalanced \S+", shown[-1])
     assert len(shown[-1]) < 50
 

@@ -234,13 +234,7 @@ class PackingScene(Scene):
 
     def make(self, progress: Progress | None = None) -> Packing:
         """The packing, with its metadata; nothing is written."""
-
-        def report(state: PackingState) -> None:
-            if progress is not None:
-                progress.show(
-                    f"{state.stage} {state.stress:.4g} Pa, n {state.porosity:.4f}, unbalanced {state.unbalanced:.0e}"
-                )
-
+        report = None if progress is None or not progress.draws else lambda state: progress.show(_state_text(state))
         method = self.method
         if isinstance(method, Cloud):
             packing = cloud(self.number, self.sizes, self.box, method.porosity, self.seed)
@@ -277,6 +271,10 @@ class PackingScene(Scene):
             found["bed_height"] = f"{height:.6g} m"
         # The seed makes the same packing only on as many threads.
         return _described(packing, found | {"threads": str(dem.threads)}, self.seed)
+
+
+def _state_text(state: PackingState) -> str:
+    return f"{state.stage} {state.stress:.4g} Pa, n {state.porosity:.4f}, unbalanced {state.unbalanced:.0e}"
 
 
 def _described(packing: Packing, found: dict[str, str], seed: int) -> Packing:

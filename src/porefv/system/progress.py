@@ -67,12 +67,9 @@ class Progress:
     def show(self, state: str, part: float | None = None) -> None:
         """Show what is known of the stage that lasts, and which part of it is done if that is known."""
         if self._bar is not None:
-            task = self._bar.task_ids[0]
-            if part is not None and self._bar.tasks[0].total is None:
-                self._bar.reset(task, total=1.0 - part)  # what remains by the clock is told from what is done from here
-                self._bar.tasks[0].fields["begin"] = part
-            begin = self._bar.tasks[0].fields.get("begin", 0.0)
-            self._bar.update(task, state=state, completed=None if part is None else part - begin)
+            # The first part shown is where the stage goes on from: rich tells what remains by the clock from the next.
+            total = None if part is None else 1.0
+            self._bar.update(self._bar.task_ids[0], state=state, completed=part, total=total)
 
     def note(self, text: str) -> None:
         """Write a line that stays on the terminal; nothing in a log."""
