@@ -23,6 +23,8 @@ def test_inputs_of_a_flow_and_its_mesh_cannot_be_set_again(flow):
     for thing, name in [(flow.mesh, "packing"), (flow.mesh.facets, "mesh"), (flow.mesh.throats, "closed")]:
         with pytest.raises(AttributeError, match="cannot be set"):
             setattr(thing, name, None)
+    with pytest.raises(ValueError, match="read-only"):
+        flow.gravity[2] = -9.81
     assert flow.permeability == before
 
 

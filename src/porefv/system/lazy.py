@@ -23,12 +23,17 @@ class lazy_property(cached_property[T]):  # noqa: N801  # a decorator, as its ba
 
 
 class FixedInputs:
-    """Base of an object whose results follow from its inputs: these can be set once, in `__init__`."""
+    """Base of an object whose results follow from its inputs: these can be set once, in `__init__`.
+
+    An array that is set becomes read-only: give a copy.
+    """
 
     def __setattr__(self, name: str, value: Any) -> None:
         if not name.startswith("_") and (name in vars(self) or hasattr(type(self), name)):
             kind = type(self).__name__
             raise AttributeError(f"{kind}.{name} cannot be set: results follow from it. Make a new {kind}")
+        if isinstance(value, np.ndarray):
+            freeze(value)
         super().__setattr__(name, value)
 
 
