@@ -19,7 +19,7 @@ from porefv.dem.dem import DEM
 from porefv.errors import ComputationError, InputError, MissingExtraError
 from porefv.packing.box import WALLS
 from porefv.scenes.simulation_scene import SimulationScene
-from porefv.simulation import measurements, series, simulate
+from porefv.simulation import measurements, simulate
 from porefv.simulation.measurements import layer_stresses
 from porefv.simulation.run_record import read_record
 from porefv.simulation.series import read_profiles, read_series
@@ -307,7 +307,7 @@ def test_results_are_replaced_by_force_only_and_other_files_never(path, capsys, 
 
 
 def test_parquet_is_missed_before_the_run(path, monkeypatch):
-    monkeypatch.setattr(series.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     path.write_text(DRY + "[output]\nparquet = true\n")
     with pytest.raises(MissingExtraError, match="pip install pyarrow"):
         simulate.run(SimulationScene.read(path))

@@ -5,11 +5,10 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-from porefv.errors import InputError
 from porefv.export.pictures import SIZE, picture
 from porefv.flow.walls import Walls
 from porefv.results.reading import Results
-from porefv.system.atomic_files import atomic_write
+from porefv.system.atomic_files import atomic_write, picture_target
 
 
 def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SIZE) -> None:
@@ -22,11 +21,7 @@ def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SI
     ComputationError
         If this machine cannot draw.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
+    path = picture_target(path)
     summary = results.summary
     title = f"{Path(summary['scene']).stem}: " if summary["scene"] else ""
     title += f"{summary['packing']['spheres']} spheres"

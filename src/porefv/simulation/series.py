@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -11,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.errors import FORCE_OPTION, InputError, MissingExtraError
+from porefv.errors import FORCE_OPTION, InputError
 from porefv.system.atomic_files import atomic_write
+from porefv.system.optional_imports import ensure_installed
 
 SERIES, PROFILES, PARQUET = "series.csv", "profiles.csv", "series.parquet"
 
@@ -95,8 +95,7 @@ def _read(path: Path) -> np.ndarray:
 
 def require_parquet() -> None:
     """MissingExtraError without pyarrow."""
-    if importlib.util.find_spec("pyarrow") is None:
-        raise MissingExtraError("pyarrow", "Writing series.parquet")
+    ensure_installed("pyarrow", "pyarrow", "Writing series.parquet")
 
 
 def write_parquet(directory: Path) -> None:

@@ -12,7 +12,7 @@ from porefv.errors import InputError, MissingExtraError, counted
 from porefv.packing.box import WALLS
 from porefv.simulation.run_record import RunRecord, read_record
 from porefv.simulation.series import PROFILES, read_profiles, read_series
-from porefv.system.atomic_files import atomic_write
+from porefv.system.atomic_files import atomic_write, picture_target
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,11 +33,7 @@ def draw_series(directory: str | PathLike[str], path: str | PathLike[str]) -> No
     MissingExtraError
         If matplotlib is not installed.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
+    path = picture_target(path)
     picture = series_picture(directory)
     with atomic_write(path) as temporary:
         picture.savefig(temporary, dpi=150)

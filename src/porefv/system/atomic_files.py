@@ -43,6 +43,16 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def picture_target(path: str | PathLike[str]) -> Path:
+    """The path of a picture to be drawn; InputError, before it is, if no PNG file can be written there."""
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
+    return path
+
+
 @contextmanager
 def atomic_directory(path: str | PathLike[str], force: bool = False) -> Iterator[Path]:
     """Yield an empty temporary directory beside `path`, which becomes `path` if the block succeeds.

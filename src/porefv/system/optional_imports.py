@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from porefv.errors import MissingExtraError
@@ -25,6 +26,12 @@ def load(module: str, purpose: str) -> Any:
             return import_module(module)
     except ModuleNotFoundError:
         raise MissingExtraError("pyvista", purpose) from None
+
+
+def ensure_installed(module: str, package: str, purpose: str) -> None:
+    """MissingExtraError, whose message begins with the purpose, if a module of a package is not installed."""
+    if find_spec(module) is None:
+        raise MissingExtraError(package, purpose)
 
 
 @contextmanager

@@ -9,19 +9,18 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from porefv.errors import InputError, MissingExtraError
+from porefv.errors import InputError
 from porefv.packing.box import Box
 from porefv.packing.files.text import AnyPath, make_box, quoted, read_bytes
 from porefv.packing.files.vtk_legacy import LegacyMesh
 from porefv.packing.packing import Packing, Source
 from porefv.system.atomic_files import atomic_write
-from porefv.system.optional_imports import load
+from porefv.system.optional_imports import ensure_installed, load
 
 _HALVES = {"radius": 1.0, "radii": 1.0, "r": 1.0, "diameter": 0.5, "diameters": 0.5}
 _CORNERS = ("box_lower", "box_upper")
@@ -97,8 +96,7 @@ def _read_mesh(path: AnyPath) -> LegacyMesh | _XmlMesh:
         return LegacyMesh(path, content)
     if not content[:100].lstrip().startswith((b"<?xml", b"<VTKFile")):
         raise InputError(f"{path}: not a VTK file (legacy .vtk, or XML .vtp or .vtu).")
-    if find_spec("vtkmodules") is None:
-        raise MissingExtraError("pyvista", "Reading VTK files")
+    ensure_installed("vtkmodules", "pyvista", "Reading VTK files")
     # -P: modules beside the program do not hide those of Python.
     command = [sys.executable, "-P", os.fspath(_READER), os.fspath(path)]
     done = subprocess.run(command, capture_output=True, check=False)
