@@ -43,7 +43,8 @@ def to_meshio(mesh: CellMesh, **cell_data: Any) -> meshio.Mesh:
     solids = polyhedra(mesh)
     blocks = {NAMES[kind]: solids.of_type(kind) for kind in (TETRA, WEDGE, HEXAHEDRON)}
     ids, wedges = blocks["wedge"]
-    blocks["wedge"] = ids, wedges[:, [0, 2, 1, 3, 5, 4]]  # meshio's wedge is Gmsh's, the mirror image of VTK's
+    # meshio mirrors wedges in VTK files, for the order that VTK had before 9.7. Mirrored here, they are right there.
+    blocks["wedge"] = ids, wedges[:, [0, 2, 1, 3, 5, 4]]
     blocks = {name: block for name, block in blocks.items() if len(block[0])}
     data = {"cell": [ids for ids, _ in blocks.values()]}
     if isinstance(mesh, PoreMesh):
