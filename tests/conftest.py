@@ -16,6 +16,15 @@ from porefv.packing.box import Box
 from porefv.packing.packing import Packing
 
 DATA = Path(__file__).parent.parent / "data"
+SCENE = """\
+packing = "{packing}"
+[walls]
+y_min = {{ pressure = 1.0 }}
+y_max = {{ pressure = 0.0 }}
+[output]
+quantities = ["permeability", "pressure", "forces"]
+vtk = {vtk}
+"""
 
 # Kernels compile, or load from numba's cache, inside the first example: no deadline can be fair.
 settings.register_profile("porefv", deadline=None)
@@ -68,6 +77,33 @@ def unit_flow():
         return PoreFlow(mesh, walls, Fluid(viscosity=1.0, density=1.0), model, **options)
 
     return unit_flow
+
+
+@pytest.fixture(scope="session")
+def rewritten():
+    """rewritten(path, change): a checkpoint whose header and arrays change(header, content) has changed."""
+
+    def rewritten(path, change):
+        with np.load(path) as file:
+            content = dict(file)
+        header = json.loads(str(content["header"]))
+        change(header, content)
+        content["header"] = np.array(json.dumps(header))
+        np.savez(path, **content)
+
+    return rewritten
+
+
+@pytest.fixture(scope="session")
+def write_scene():
+    """write_scene(folder, packing, vtk="false"): the path of a scene of a packing of data/packings."""
+
+    def write_scene(folder, packing, vtk="false"):
+        path = folder / "scene.toml"
+        path.write_text(SCENE.format(packing=(DATA / "packings" / packing).as_posix(), vtk=vtk))
+        return path
+
+    return write_scene
 
 
 @pytest.fixture(scope="session")

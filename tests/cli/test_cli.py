@@ -15,27 +15,11 @@ from porefv.system.progress import Progress
 
 DATA = Path(__file__).parents[2] / "data"
 
-SCENE = """\
-packing = "{packing}"
-[walls]
-y_min = {{ pressure = 1.0 }}
-y_max = {{ pressure = 0.0 }}
-[output]
-quantities = ["permeability", "pressure", "forces"]
-vtk = {vtk}
-"""
-
 
 @pytest.fixture
-def scene(tmp_path):
+def scene(write_scene, tmp_path):
     """The path of a scene of 25 spheres."""
     return write_scene(tmp_path, "n25_s1.csv")
-
-
-def write_scene(folder, packing, vtk="false"):
-    path = folder / "scene.toml"
-    path.write_text(SCENE.format(packing=(DATA / "packings" / packing).as_posix(), vtk=vtk))
-    return path
 
 
 def run(*arguments, **options):
@@ -95,7 +79,7 @@ def test_info_prints_a_summary(scene, capsys):
         assert re.search(line, out), line
 
 
-def test_info_of_the_pores_alone(tmp_path, capsys):
+def test_info_of_the_pores_alone(write_scene, tmp_path, capsys):
     path = write_scene(tmp_path, "n25_s1.csv")
     path.write_text(path.read_text().replace('["permeability", "pressure", "forces"]', "[]"))
     assert main(["solve", str(path)]) == 0
@@ -104,7 +88,7 @@ def test_info_of_the_pores_alone(tmp_path, capsys):
     assert "122" in out and "permeability" not in out
 
 
-def test_plot_draws_a_picture(tmp_path, capsys):
+def test_plot_draws_a_picture(write_scene, tmp_path, capsys):
     pytest.importorskip("pyvista")
     path = write_scene(tmp_path, "nine_0.72.csv", vtk="true")
     main(["solve", str(path), "--quiet"])
@@ -125,7 +109,7 @@ def test_help_comes_at_once():
 
 
 @pytest.mark.parametrize("vtk", ["false", "true"])
-def test_vtk_is_imported_only_if_asked_for(tmp_path, vtk):
+def test_vtk_is_imported_only_if_asked_for(write_scene, tmp_path, vtk):
     path = write_scene(tmp_path, "n25_s1.csv", vtk)
     code = (
         "import sys\nfrom porefv.cli.program import main\n"

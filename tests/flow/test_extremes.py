@@ -489,15 +489,6 @@ def test_memory_is_compared_before_work_starts(reference, monkeypatch):
 
 # ---- files half written --------------------------------------------------------------------------------------
 
-SCENE = """\
-packing = "{packing}"
-[walls]
-y_min = {{ pressure = 1.0 }}
-y_max = {{ pressure = 0.0 }}
-[output]
-quantities = ["permeability", "pressure", "forces"]
-vtk = {vtk}
-"""
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
 
 
@@ -509,12 +500,11 @@ def compiled(tmp_path_factory):
 
 
 @pytest.fixture
-def project(tmp_path, compiled):
+def project(tmp_path, compiled, write_scene):
     """A scene of 2000 spheres, and results of an earlier one."""
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "summary.json").write_text("earlier")
-    text = SCENE.format(packing=(PACKINGS / "n2000_s1.csv").as_posix(), vtk="true")
-    (tmp_path / "scene.toml").write_text(text)
+    write_scene(tmp_path, "n2000_s1.csv", vtk="true")
     return tmp_path
 
 

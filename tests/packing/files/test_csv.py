@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from porefv.errors import InputError
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
 
@@ -17,18 +16,6 @@ def read(tmp_path):
         path = tmp_path / "grains.csv"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return Packing.read(path)
-
-    return reader
-
-
-@pytest.fixture
-def error(read):
-    """The error of reading a CSV file with this content, without the directory."""
-
-    def reader(content):
-        with pytest.raises(InputError) as caught:
-            read(content)
-        return str(caught.value).split("grains.csv", 1)[1]
 
     return reader
 

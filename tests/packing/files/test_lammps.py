@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from porefv.errors import InputError
 from porefv.packing.packing import Packing
 
 DATA = """LAMMPS data file, any title: Atoms
@@ -54,18 +53,6 @@ def read(tmp_path):
     def reader(content):
         (tmp_path / "grains.lammps").write_text(content)
         return Packing.read(tmp_path / "grains.lammps")
-
-    return reader
-
-
-@pytest.fixture
-def error(read):
-    """The error of reading a LAMMPS file with this content, without the directory."""
-
-    def reader(content):
-        with pytest.raises(InputError) as caught:
-            read(content)
-        return str(caught.value).split("grains.lammps", 1)[1]
 
     return reader
 
