@@ -49,7 +49,7 @@ def coupled(reference):
     """coupled(model, **options): 25 grains pressed by a plate, drained at both ends, after 40 steps."""
 
     def make(model=None, steps=40, **options):
-        dem = DEM(reference("n25_s1"), Material(), {"z_max": Plate(stress=3e3, top_speed=0.05)}, threads=1)
+        dem = DEM(reference("n25_s1"), Material(), {"z_max": Plate(stress=3e3, top_speed=0.05)})
         coupling = Coupling(dem, DRAINED, Fluid(viscosity=100.0), model, **options)
         coupling.run(steps)
         return coupling
@@ -79,7 +79,6 @@ def assert_same(one, other):
 def test_a_resumed_run_is_the_run_to_the_last_bit(reference, tmp_path, scheme):
     dem = DEM(
         reference("n200_s1"), Material(15e6, 0.5, 30.0, 2600.0), {"z_max": Plate(stress=6e3, top_speed=0.05)},
-        threads=1,
     )  # fmt: skip
     viscosity = {"implicit-drag": 100.0, "semi-implicit": 1e-3}[scheme]
     coupling = Coupling(dem, DRAINED, Fluid(viscosity=viscosity), scheme=scheme, renewal=1e-3)

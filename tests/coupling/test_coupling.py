@@ -33,7 +33,7 @@ def sample(reference):
     def make(stress, friction=30.0, **plates):
         dem = DEM(
             reference("n200_s1"), Material(15e6, 0.5, friction, 2600.0),
-            {"z_max": Plate(stress=3e3, top_speed=0.05)}, damping=0.3, threads=1,
+            {"z_max": Plate(stress=3e3, top_speed=0.05)}, damping=0.3,
         )  # fmt: skip
         dem.run_to_rest(1e-5, 1e-4, 20_000)
         dem.damping = 0.0
@@ -121,7 +121,7 @@ def test_facet_forces_are_those_of_a_steady_flow(reference, slip, model):
 def piston(viscosity, scheme="implicit-drag"):
     """One grain between smooth walls, not touching; z_max, drained, pushed down at a given speed."""
     packing = Packing([[0.5, 0.5, 0.5]], [0.4], Box([0, 0, 0], [1, 1, 1]))
-    dem = DEM(packing, plates={"z_max": Plate(velocity=(0.0, 0.0, -1e-6))}, step=1e-5, threads=1)
+    dem = DEM(packing, plates={"z_max": Plate(velocity=(0.0, 0.0, -1e-6))}, step=1e-5)
     walls = Walls.from_mapping({"z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
     return Coupling(dem, walls, Fluid(viscosity=viscosity), scheme=scheme, tolerance=1e-12)
 
@@ -150,7 +150,7 @@ def test_a_grain_is_pushed_through_a_tube_as_its_throats_let_it(steps):
     # The pore below is joined to that above by throats of conductance K in all. A grain that sweeps the area A drives
     # A v through them, against a pressure A v / K: m v' = F - A² v / K, v = (1 - exp(-t A²/(K m))) F K / A².
     packing = Packing([[0.5, 0.5, 0.5]], [0.45], Box([0, 0, 0], [1, 1, 1]))
-    dem = DEM(packing, Material(15e6), step=1e-5, threads=1)
+    dem = DEM(packing, Material(15e6), step=1e-5)
     walls = Walls.from_mapping({"z_max": {"pressure": 0.0}, "lateral": {"slip": True}})
     coupling = Coupling(dem, walls, Fluid(viscosity=500.0), scheme="implicit-drag", tolerance=1e-12)
     force = 20.0

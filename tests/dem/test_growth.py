@@ -22,7 +22,7 @@ def wall_mean(dem):
 @pytest.fixture(scope="module")
 def smooth():
     """1000 grains grown without friction, 15 MPa, to 5 kPa."""
-    return grow(1000, HALF, CUBE, Material(young=15e6, friction_angle=0.0), stress=5e3, seed=1, threads=1)
+    return grow(1000, HALF, CUBE, Material(young=15e6, friction_angle=0.0), stress=5e3, seed=1)
 
 
 def test_smooth_growth_makes_the_packing_that_yade_makes(smooth):
@@ -54,7 +54,7 @@ def test_a_packing_at_rest_stays_at_rest(smooth):
 
 
 def test_more_friction_in_growth_makes_looser_packings_with_fewer_contacts():
-    packings = [grow(300, HALF, CUBE, stress=5e3, seed=1, friction_angle=angle, threads=1) for angle in (0, 10, 30)]
+    packings = [grow(300, HALF, CUBE, stress=5e3, seed=1, friction_angle=angle) for angle in (0, 10, 30)]
     porosities = [dem.porosity for dem in packings]
     contacts = [dem.coordination for dem in packings]
     assert porosities == sorted(porosities) and porosities[-1] - porosities[0] > 0.02
@@ -63,7 +63,7 @@ def test_more_friction_in_growth_makes_looser_packings_with_fewer_contacts():
 
 
 def test_friction_is_lowered_until_the_porosity_is_reached_at_the_stress():
-    dem = grow(300, HALF, CUBE, stress=5e3, porosity=0.455, seed=1, threads=1)
+    dem = grow(300, HALF, CUBE, stress=5e3, porosity=0.455, seed=1)
     # Friction is lowered by steps, and the last correction of stress moves the radii: a thousandth.
     assert_allclose(dem.porosity, 0.455, atol=1e-3)
     assert_allclose(mean_stress(dem), 5e3, rtol=2e-3)
@@ -72,11 +72,11 @@ def test_friction_is_lowered_until_the_porosity_is_reached_at_the_stress():
 
 
 def test_growth_to_a_porosity_ends_there_pressing_or_apart():
-    dense = grow(200, HALF, CUBE, porosity=0.44, seed=1, threads=1)
+    dense = grow(200, HALF, CUBE, porosity=0.44, seed=1)
     assert_allclose(dense.porosity, 0.44, rtol=1e-12)
     assert dense.unbalanced < 1e-3
     assert_allclose(wall_mean(dense), mean_stress(dense), rtol=5e-3)
-    loose = grow(200, HALF, CUBE, porosity=0.6, seed=1, threads=1)
+    loose = grow(200, HALF, CUBE, porosity=0.6, seed=1)
     assert_allclose(loose.porosity, 0.6, rtol=1e-12)
     assert mean_stress(loose) < 1e-9 * loose.material.young
     assert not loose.velocities.any()

@@ -20,7 +20,7 @@ def test_a_cloud_settles_to_a_bed_whose_weight_the_floor_bears():
     box = Box([0, 0, 0], [0.02, 0.02, 0.06])
     start = cloud(100, UniformSizes(0.8), box, 0.9, seed=1)
     rough = {name: Plate(friction_angle=30.0) for name in WALLS}
-    dem = DEM(start, Material(), rough, gravity=(0, 0, -9.81), damping=0.3, threads=1)
+    dem = DEM(start, Material(), rough, gravity=(0, 0, -9.81), damping=0.3)
     assert settle(dem) is dem
     weight = 9.81 * dem.masses.sum()
     # Side walls carry some by friction. The mean resultant on a grain is a thousandth of a contact's force.

@@ -216,7 +216,9 @@ def moved(mesh, velocities, speeds, h):
     points, sizes = mesh.local_points.copy(), mesh.sizes.copy()
     points[:n] += h * velocities
     sizes[n:] += h * speeds
-    return polyhedron_volumes(mesh.cells, Vertices(n, points, sizes))
+    volumes = np.empty(mesh.n_cells)
+    polyhedron_volumes(0, mesh.n_cells, mesh.cells, Vertices(n, points, sizes), volumes)
+    return volumes
 
 
 @pytest.mark.parametrize("name", ["n25_s1", "n200_s1", "sc8"])

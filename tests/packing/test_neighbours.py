@@ -1,4 +1,3 @@
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,6 +5,7 @@ from hypothesis import strategies as st
 
 from porefv.errors import InputError
 from porefv.packing.neighbours import neighbour_pairs
+from porefv.system.threads import limited_threads
 
 
 def brute_force(centres, radii, gap=0.0):
@@ -72,12 +72,8 @@ def test_pairs_are_int32_in_lexicographic_order_whatever_the_number_of_threads()
     pairs = neighbour_pairs(centres, radii)
     assert pairs.dtype == np.int32 and (pairs[:, 0] < pairs[:, 1]).all()
     np.testing.assert_array_equal(pairs, pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))])
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
+    with limited_threads(1):
         np.testing.assert_array_equal(neighbour_pairs(centres, radii), pairs)
-    finally:
-        numba.set_num_threads(threads)
 
 
 def test_a_dense_cluster_of_fines_in_a_large_box_is_not_quadratic():

@@ -18,7 +18,7 @@ class Slits(ConductanceModel):
 
 @pytest.mark.parametrize("model", [None, Slits()])
 def test_a_coupled_state_is_loaded_with_its_conductance_model(reference, tmp_path, model):
-    dem = DEM(reference("n25_s1"), threads=1)
+    dem = DEM(reference("n25_s1"))
     coupling = Coupling(dem, Walls.along("z"), conductance=model)
     coupling.run(3)
     record = RunRecord({}, None, dem.box.size.tolist())
@@ -32,7 +32,7 @@ def test_a_coupled_state_is_loaded_with_its_conductance_model(reference, tmp_pat
 
 
 def test_a_state_of_grains_alone_is_loaded(reference, tmp_path):
-    dem = DEM(reference("n25_s1"), threads=1)
+    dem = DEM(reference("n25_s1"))
     dem.run(3)
     RunRecord({}, None, dem.box.size.tolist()).save(tmp_path, dem, None, False, {}, {})
     grains, coupling = read_record(tmp_path).load(tmp_path, Slits())

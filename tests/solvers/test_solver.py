@@ -13,6 +13,7 @@ from porefv.errors import ComputationError, InputError
 from porefv.solvers.approximate_cholesky import ApproximateCholesky
 from porefv.solvers.network import Network
 from porefv.solvers.solver import DIRECT_LIMIT, SOLVERS, TOLERANCE, Solver
+from porefv.system import threads
 
 METHODS = ["direct", "cg"]
 
@@ -173,14 +174,11 @@ def test_repeated_solutions_are_equal_to_the_bit(solver):
     assert_array_equal(one, two)
 
 
-def test_solutions_do_not_depend_on_the_number_of_threads():
+def test_solutions_do_not_depend_on_the_number_of_threads(monkeypatch):
+    monkeypatch.setattr(threads, "_processors", lambda: 3)
     network, rhs = grid_network(28, 6)  # large enough to be cut into parts
-    threads = numba.get_num_threads()
-    try:
-        numba.set_num_threads(1)
+    with threads.limited_threads(1):
         one, _ = solve(network, rhs, "cg")
-    finally:
-        numba.set_num_threads(threads)
     assert_array_equal(one, solve(network, rhs, "cg")[0])
 
 

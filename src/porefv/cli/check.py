@@ -22,12 +22,12 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
-    from porefv.cli.compilation import announce_compilation_of_flow
+    from porefv.cli.compilation import announce_compilation
     from porefv.scenes.toml_file import SceneSource
     from porefv.system.progress import Progress
 
     progress = Progress()
-    announce_compilation_of_flow(progress)
+    announce_compilation(progress)
     keys = SceneSource.read(options.scene).data
     if "stages" in keys:
         from porefv.cli import simulate

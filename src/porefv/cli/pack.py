@@ -24,7 +24,6 @@ def register(commands: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from porefv.cli.compilation import announce_compilation
-    from porefv.dem import motion
     from porefv.scenes.packing_scene import PackingScene
     from porefv.system.progress import Progress
     from porefv.system.threads import limit_threads
@@ -32,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     scene = PackingScene.read(options.scene)
     limit_threads(options.threads)
     progress = Progress(scene.stages, quiet=options.quiet)
-    announce_compilation(progress, motion.advance, "half a minute")
+    announce_compilation(progress)
     packing = scene.pack(force=options.force, progress=progress)
     if not options.quiet:
         print(outcome_text(packing, scene.output))

@@ -25,6 +25,7 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
+    from porefv.cli.compilation import announce_compilation
     from porefv.scenes.simulation_scene import SimulationScene
     from porefv.simulation import simulate
     from porefv.simulation.run_record import read_record
@@ -36,6 +37,7 @@ def run(options: argparse.Namespace) -> None:
     scene = SimulationScene.read(options.scene)
     limit_threads(options.threads)
     progress = Progress([stage.name for stage in scene.stages], quiet=options.quiet)
+    announce_compilation(progress)
     directory = simulate.run(scene, force=options.force, resume=options.resume, progress=progress)
     if not options.quiet:
         print(outcome_text(read_record(directory), directory))

@@ -21,7 +21,7 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
-    from porefv.cli.compilation import announce_compilation_of_flow
+    from porefv.cli.compilation import announce_compilation
     from porefv.results.reading import read
     from porefv.scenes.flow_scene import FlowScene
     from porefv.system.progress import Progress
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> None:
     scene = FlowScene.read(options.scene)
     limit_threads(options.threads)
     progress = Progress(scene.stages, quiet=options.quiet)
-    announce_compilation_of_flow(progress)
+    announce_compilation(progress)
     directory = scene.solve(force=options.force, progress=progress)
     if not options.quiet:
         print(outcome_text(read(directory)))

@@ -9,8 +9,9 @@ import numpy as np
 from porefv.conductance.model import ConductanceModel
 from porefv.errors import InputError
 from porefv.mesh.throats import Throats
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import kernel
 from porefv.system.number_checks import LEAST, MOST, within_range
+from porefv.system.threads import for_rows
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,19 @@ class HydraulicRadius(ConductanceModel):
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         """(t,): conductivity g of each throat [m⁴]; `slip` (6,) bool marks the walls of symmetry."""
-        return _hydraulic_radius(self.alpha, throats.fluid_areas, throats.volumes, throats.wetted_surfaces(slip))
+        found = np.empty(len(throats))
+        surfaces = throats.wetted_surfaces(slip)
+        for_rows(
+            _hydraulic_radius, len(found), float(self.alpha), throats.fluid_areas, throats.volumes, surfaces, found,
+            least=1 << 16,
+        )  # fmt: skip
+        return found
 
 
-@njit(cache=True, parallel=True)
-def _hydraulic_radius(alpha: float, areas: np.ndarray, volumes: np.ndarray, surfaces: np.ndarray) -> np.ndarray:
-    """α A^f (φ / Σγ)², zero where φ or Σγ is not positive."""
-    conductivity = np.zeros_like(areas)
-    for t in prange(areas.shape[0]):
+@kernel
+def _hydraulic_radius(first, last, alpha, areas, volumes, surfaces, conductivity):
+    """Fill in α A^f (φ / Σγ)² of throats first ... last - 1, zero where φ or Σγ is not positive."""
+    for t in range(first, last):
+        conductivity[t] = 0.0
         if volumes[t] > 0.0 and surfaces[t] > 0.0:
             conductivity[t] = alpha * areas[t] * (volumes[t] / surfaces[t]) ** 2
-    return conductivity

@@ -23,7 +23,7 @@ from porefv.solvers.direct import SparseFactor
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network, reached
 from porefv.solvers.solver import Solver
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -345,7 +345,7 @@ class _PowerRule:
         return self._wrong * self._size / before <= self._part * self._power
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _yield(mobilities, forces, moves):
     """moves += D forces, both (n + 6, 3); walls yield along their normals alone."""
     n = mobilities.grains.shape[0]
@@ -356,7 +356,7 @@ def _yield(mobilities, forces, moves):
         moves[n + w, WALL_AXES[w]] += mobilities.walls[w] * forces[n + w, WALL_AXES[w]]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _multiply(exchange, links, mobilities, forces, q, aq):
     """aq = (G + E D Eᵀ) q; returns q·aq.
 
@@ -392,7 +392,7 @@ def _multiply(exchange, links, mobilities, forces, q, aq):
     return _dot(q, aq)
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@helper(fastmath={"reassoc", "contract"})
 def _dot(a, b):
     total = 0.0
     for i in range(a.shape[0]):
@@ -400,13 +400,13 @@ def _dot(a, b):
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _power_and_size(x, rhs, r, weights):
     """|x·b| and Σ w r²."""
     return abs(_dot(x, rhs)), _weighted_square(r, weights)
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@helper(fastmath={"reassoc", "contract"})
 def _weighted_square(r, weights):
     total = 0.0
     for i in range(r.shape[0]):

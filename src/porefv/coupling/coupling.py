@@ -24,7 +24,6 @@ from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
-from porefv.system.threads import threads_for
 from porefv.system.timer import Timer
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
@@ -249,11 +248,10 @@ class Coupling:
             product = state.products[0] + 0.5 * state.products[1]
         if state.fresh:
             tolerance = min(tolerance, _ANEW)
-        with threads_for(len(guess)):
-            if not len(state.factor_mobilities):
-                state.factor_mobilities = wall_mobilities.copy()
-                equation.prepare(state.factor_mobilities)
-            pressure, product, iterations = equation.solve(moves, wall_mobilities, guess, tolerance, product)
+        if not len(state.factor_mobilities):
+            state.factor_mobilities = wall_mobilities.copy()
+            equation.prepare(state.factor_mobilities)
+        pressure, product, iterations = equation.solve(moves, wall_mobilities, guess, tolerance, product)
         # The change is kept only where its product with the matrix is known too, or is not needed.
         goes_on = not state.fresh and (state.products.size > 0 or not steady)
         state.rate = pressure - state.pressure if goes_on else np.zeros_like(pressure)

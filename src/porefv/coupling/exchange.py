@@ -23,7 +23,7 @@ from porefv.flow.forces import facet_forces
 from porefv.flow.pressure_on_grains import SolidPressureWeights
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_NORMALS
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 
 EXCHANGES = ("facets", "volumes")
 
@@ -136,7 +136,7 @@ def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> np.
     return gradients
 
 
-@njit(cache=True)
+@kernel
 def _gather_facets(cells, facet_cells, facet_vertices, forces, gradients):
     """Add to each cell what its facets' unit forces (f, 3, 3) do to its vertices, outward from the cell."""
     for f in range(facet_cells.shape[0]):
@@ -150,7 +150,7 @@ def _gather_facets(cells, facet_cells, facet_vertices, forces, gradients):
                             gradients[t, i, axis] += sense * forces[f, v, axis]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(exchange, moves, out):
     """out[node] += Σ gradient · move over each cell's vertices.
 
@@ -172,7 +172,7 @@ def gather(exchange, moves, out):
         out[nodes[t]] += total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def spread(exchange, pressure, out):
     """out[vertex] += gradient × pressure[node], over the vertices of each cell.
 

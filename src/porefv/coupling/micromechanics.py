@@ -14,7 +14,8 @@ from porefv.errors import InputError
 from porefv.mesh.facet_kernels import area_vector, spheres_first
 from porefv.mesh.vectors import wall_distance
 from porefv.packing.box import WALL_AXES
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
+from porefv.system.threads import for_rows
 
 if TYPE_CHECKING:
     from porefv.dem.measurements import Contacts
@@ -172,19 +173,23 @@ def _integrals(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: Arr
     ):
         if moves.shape != shape or not np.isfinite(moves).all():
             raise InputError(f"{what}, must be finite numbers of shape {shape}, not {moves.shape}")
-    return _displacement_integrals(mesh.cells, mesh.cell_vertices, Displacements(u, walls))
+    integrals = np.zeros((mesh.n_cells, 3, 3))
+    moves = Displacements(u, walls)
+    for_rows(_displacement_integrals, mesh.n_cells, mesh.cells, mesh.cell_vertices, moves, integrals)
+    return integrals
 
 
-@njit(cache=True, parallel=True)
-def _displacement_integrals(cells, vertices, displacements):
-    """∮ u ⊗ n dS over each cell: facet by facet, the mean displacement times the area vector.
+@kernel
+def _displacement_integrals(first, last, cells, vertices, displacements, integrals):
+    """Add ∮ u ⊗ n dS over cells first ... last - 1 to `integrals` (m, 3, 3).
+
+    Facet by facet, it is the mean displacement times the area vector.
 
     The facet opposite to a wall has a projection on it, the cell's face there: the same displacement but for the
     component along the wall's normal, which is the wall's.
     """
     n = vertices.n_spheres
-    integrals = np.zeros((cells.shape[0], 3, 3))
-    for t in prange(cells.shape[0]):
+    for t in unsigned_range(first, last):
         for i in range(4):
             a, b, c = cells[t, (i + 1) % 4], cells[t, (i + 2) % 4], cells[t, (i + 3) % 4]
             if min(a, b, c) >= n:  # three walls: the corner of the box, without area
@@ -202,10 +207,9 @@ def _displacement_integrals(cells, vertices, displacements):
                 mean[axis] = vertices.points[n + wall, axis] * displacements.walls[wall]
                 for p in range(3):
                     integrals[t, p, axis] -= mean[p] * area[axis]
-    return integrals
 
 
-@njit(cache=True)
+@helper
 def _mean_displacement(a, b, c, vertices, displacements):
     """Mean displacement over a facet: linear on a triangle, bilinear between the corners of the others."""
     moves, wall_moves = displacements
@@ -229,7 +233,7 @@ def _mean_displacement(a, b, c, vertices, displacements):
     return mean
 
 
-@njit(cache=True)
+@helper
 def _halve_with_wall(wall, vertices, wall_moves, mean):
     """Half of the facet's corners are on the wall: along its normal they move with it."""
     axis = WALL_AXES[wall]

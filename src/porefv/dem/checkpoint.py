@@ -16,13 +16,16 @@ from porefv.dem import state_files
 from porefv.dem.dem import DEM
 from porefv.dem.grain_state import GrainState
 from porefv.dem.material import Material
+from porefv.dem.pair_listing import divide_into_ranges, ranges_for
 from porefv.dem.plate import Plate
 from porefv.dem.state_files import ArrayOf, Arrays
 from porefv.errors import ComputationError, InputError
 
-FORMAT, VERSION = "porefv.dem", 3
+FORMAT, VERSION = "porefv.dem", 4
 
-# What entries are called in files of version 2 ...
+# What entries are called in files of version 3, in which each thread had a range of contacts ...
+_NAMES_OF_VERSION_3 = {"ranges": "threads"}
+# ... what others are called in files of version 2 ...
 _NAMES_OF_VERSION_2 = {
     "grains_motion": "state",
     "grains_inverse_mass": "inverse_mass",
@@ -72,13 +75,14 @@ class Settings:
     damping : float
     step : float
         [s]
-    threads : int
+    ranges : int
+        Into how many the contacts are divided.
     """
 
     gravity: Annotated[np.ndarray, ArrayOf("f8", (3,))]
     damping: float
     step: float
-    threads: int
+    ranges: int
 
 
 def save(dem: DEM, path: str | PathLike[str]) -> None:
@@ -105,7 +109,7 @@ def pack(dem: DEM, path: str | PathLike[str]) -> Arrays:
     if dem.halfway:
         raise InputError("a step is half taken: finish it with `correct` before its state is saved")
     _refuse_runaway(dem, path)
-    settings = Settings(dem.gravity, float(dem.damping), float(dem.step), dem.threads)
+    settings = Settings(dem.gravity, float(dem.damping), float(dem.step), ranges_for(len(dem)))
     entries = [state_files.stored(part) for part in (settings, dem.state)]
     header = {
         "material": asdict(dem.material),
@@ -118,7 +122,7 @@ def pack(dem: DEM, path: str | PathLike[str]) -> Arrays:
 
 
 def load(path: str | PathLike[str]) -> DEM:
-    """The DEM that was saved, with the number of threads it was saved with.
+    """The DEM that was saved.
 
     Going on is exact, to the last bit, with the same porefv and numba on the same kind of processor.
 
@@ -138,17 +142,24 @@ def unpack(content: Arrays, path: str | PathLike[str]) -> DEM:
             header, content = _renamed(header, content)
         numbers = header["numbers"]
         settings = state_files.restored(Settings, content, numbers)
-        state = state_files.restored(GrainState, content, numbers, {"s": settings.threads})
+        state = state_files.restored(GrainState, content, numbers, {"s": settings.ranges})
+        divide_into_ranges(state)
         material = Material(**header["material"])
         plates = {
             name: Plate(**(plate | {"velocity": tuple(plate["velocity"])})) for name, plate in header["plates"].items()
         }
-        return DEM.from_state(state, material, plates, **vars(settings))
+        return DEM.from_state(
+            state, material, plates, gravity=settings.gravity, damping=settings.damping, step=settings.step
+        )
 
 
 def _renamed(header: dict[str, Any], content: Arrays) -> tuple[dict[str, Any], Arrays]:
-    """Header and content of a file of version 1 or 2, with the names of version 3."""
-    old = _NAMES_OF_VERSION_2 | (_NAMES_OF_VERSION_1 if header["version"] == 1 else {})
+    """Header and content of an older file, with the names of version 4."""
+    old = _NAMES_OF_VERSION_3
+    if header["version"] <= 2:
+        old = old | _NAMES_OF_VERSION_2
+    if header["version"] == 1:
+        old = old | _NAMES_OF_VERSION_1
     numbers, arrays = (
         entries | {new: entries[name] for new, name in old.items() if name in entries}
         for entries in (header["numbers"], content)

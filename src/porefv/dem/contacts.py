@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.packing.box import WALL_AXES, WALL_SENSES
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 # Contacts in a block, and where each quantity's column starts in it: given ...
 _SIZE = 64
@@ -73,7 +73,7 @@ class StepParameters(NamedTuple):
     fastest: float
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy")
 def grain_contacts(first, last, parameters, grains, pairs, loads):
     """Forces of the pairs of grains first ... last - 1 with later ones.
 
@@ -157,7 +157,7 @@ def grain_contacts(first, last, parameters, grains, pairs, loads):
     return dissipated + _hand_out(m, block, pair, grain, pairs, loads)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@helper(error_model="numpy")
 def _hand_out(m, block, pair, grain, pairs, loads):
     """Add what a block has found to the loads of its grains; returns the energy dissipated."""
     dissipated = 0.0
@@ -175,7 +175,7 @@ def _hand_out(m, block, pair, grain, pairs, loads):
     return dissipated
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy")
 def wall_contacts(first, last, parameters, grains, pairs, walls, loads, wall_loads):
     """Forces of the pairs first ... last - 1 of a grain and a wall.
 
@@ -251,7 +251,7 @@ def wall_contacts(first, last, parameters, grains, pairs, walls, loads, wall_loa
     return dissipated + _hand_to_walls(m, block, pair, pairs, loads, wall_loads)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@helper(error_model="numpy")
 def _hand_to_walls(m, block, pair, pairs, loads, wall_loads):
     """Add what a block has found to the loads of its grains and walls; returns the energy dissipated."""
     dissipated = 0.0
@@ -269,7 +269,7 @@ def _hand_to_walls(m, block, pair, pairs, loads, wall_loads):
     return dissipated
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=_FAST)
+@helper(error_model="numpy", fastmath=_FAST)
 def _contact_law(m, dt, block):
     """Forces, torques and dissipation of the first m contacts of a block.
 

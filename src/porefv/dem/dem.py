@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numba import get_num_threads
 
 from porefv.dem.contacts import StepParameters
 from porefv.dem.grain_state import GrainState
 from porefv.dem.material import Material
 from porefv.dem.measurements import Contacts, Energies, contact_loads
-from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, Loads, advance, free_motion
-from porefv.dem.pair_listing import list_pairs, set_stiffness
+from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, Found, Loads, Motion, advance, free_motion
+from porefv.dem.pair_listing import list_pairs, ranges_for, set_stiffness
 from porefv.dem.plate import Plate
 from porefv.errors import ComputationError, InputError
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS, Box
@@ -21,7 +20,6 @@ from porefv.packing.neighbours import neighbour_pairs
 from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
 from porefv.system.number_checks import check_number, three_numbers
-from porefv.system.threads import threads
 
 # The step, as a part of the critical one √(m/k): motion was stable to 0.85 of it or more in a dense packing, whatever
 # its friction (benchmarks/dem.py).
@@ -48,15 +46,12 @@ class DEM:
         Local non-viscous damping (Cundall), for dry preparation only: part of each acceleration, in [0, 1).
     step : float, optional
         Time step [s]; `SAFETY` times the critical one by default.
-    threads : int, optional
-        Threads to share the work between; results depend on it by rounding. All of numba's by default, as far as
-        there are 1000 grains for each.
 
     Attributes
     ----------
     state : GrainState
         Everything that it holds between two steps, besides its parameters: `material`, `plates` by wall, `gravity`,
-        `damping`, `step` and `threads`.
+        `damping` and `step`.
     halfway : bool
         Whether `predict` has begun a step that `correct` must end.
 
@@ -80,7 +75,6 @@ class DEM:
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
         damping: float = 0.0,
         step: float | None = None,
-        threads: int | None = None,
     ):
         self.material = material if material is not None else Material()
         self.gravity = three_numbers(gravity, "gravity", "m/s²")
@@ -88,11 +82,6 @@ class DEM:
         self.damping = float(damping)
         _check_grains(packing)
         assert packing.box is not None  # _check_grains has seen to it
-        n = len(packing)
-        most = get_num_threads() if threads is None else threads
-        if not (isinstance(most, int) and most >= 1):
-            raise InputError(f"threads must be a whole number, 1 or more, not {threads!r}")
-        self.threads = most if threads is not None else max(1, min(most, n // 1000))
 
         self.state = GrainState.of(packing)
         self._make_room()
@@ -120,7 +109,6 @@ class DEM:
         gravity: Sequence[float],
         damping: float,
         step: float,
-        threads: int,
     ) -> DEM:
         """The DEM that goes on from a state, to the last bit, with the parameters that belong to it.
 
@@ -128,13 +116,13 @@ class DEM:
         ----------
         state : GrainState
             Taken as it is, not copied.
-        material, plates, gravity, damping, step, threads
+        material, plates, gravity, damping, step
             As of `DEM`, and as they were: stiffnesses and masses, and what plates do, are in the state.
         """
         dem = cls.__new__(cls)
         dem.material, dem.plates = material, {name: plates[name] for name in WALLS}
         dem.gravity, dem.damping = np.array(gravity, float), damping
-        dem.step, dem.threads = step, threads
+        dem.step = step
         dem.state = state
         dem._make_room()
         return dem
@@ -142,7 +130,8 @@ class DEM:
     def _make_room(self) -> None:
         self._smallest = float(self.state.grains.motion[:, 3].min())
         # Loads of contacts: zero between two steps.
-        self._contact_loads = np.zeros((self.threads, len(self), 6)), np.zeros((self.threads, 6, 4))
+        ranges = ranges_for(len(self))
+        self._contact_loads = np.zeros((ranges, len(self), 6)), np.zeros((ranges, 6, 4))
         self.halfway = False
 
     # ---- set-up -------------------------------------------------------------------------------------------------
@@ -196,7 +185,7 @@ class DEM:
 
     def list_pairs(self) -> None:
         """List the pairs that may touch before any grain has moved by half the margin, and keep what contacts hold."""
-        list_pairs(self.state, self.material.young, self.threads)
+        list_pairs(self.state, self.material.young)
 
     # ---- motion -------------------------------------------------------------------------------------------------
 
@@ -267,11 +256,14 @@ class DEM:
         """Take steps until pairs must be listed anew; returns how many."""
         state = self.state
         loads = Loads(*self._contact_loads, applied, thrusts)
-        with threads(self.threads):
-            taken, reason = advance(
-                steps, half, self._parameters(), state.grains, state.pairs, state.wall_pairs, state.walls,
-                state.listing, loads, state.work,
-            )  # fmt: skip
+        taken, reason = advance(
+            steps,
+            half,
+            Motion(
+                self._parameters(), state.grains, state.pairs, state.wall_pairs, state.walls, state.listing, loads,
+                Found.of(ranges_for(len(self))), state.work,
+            ),
+        )  # fmt: skip
         state.steps += taken
         state.time += taken * self.step
         if reason == RUNAWAY:

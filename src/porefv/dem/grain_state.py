@@ -53,7 +53,7 @@ class GrainPairs(NamedTuple):
     touching : (p,) bool array
         Whether the pair touches.
     ranges : (s + 1,) int64 array
-        Grain at which the range of each thread starts.
+        Grain at which each range starts (`porefv.dem.pair_listing`).
     """
 
     grains: Annotated[np.ndarray, ArrayOf("i4", ("p", 2))]
@@ -141,7 +141,7 @@ class Listing(NamedTuple):
 class GrainState:
     """Everything that a DEM holds between two steps, besides its parameters.
 
-    Sizes: n grains, p pairs of grains, k pairs of a grain and a wall, s threads. Inside, grains are numbered along a
+    Sizes: n grains, p pairs of grains, k pairs of a grain and a wall, s ranges. Inside, grains are numbered along a
     space-filling curve: near in space, near in memory.
 
     Attributes

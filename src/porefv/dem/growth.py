@@ -50,7 +50,6 @@ def grow(
     damping: float = 0.2,
     unbalanced: float = 1.0e-3,
     report: Report | None = None,
-    threads: int | None = None,
 ) -> DEM:
     """Grains grown at random places between rigid smooth walls, to a mean stress, a porosity, or both.
 
@@ -78,8 +77,6 @@ def grow(
         `DEM.unbalanced` below which the packing counts as at rest.
     report : callable, optional
         Called with a `PackingState` now and then.
-    threads : int, optional
-        As for `DEM`. The packing is another, as good, for another number of threads.
 
     Returns
     -------
@@ -104,7 +101,7 @@ def grow(
     _check_growth(stress, porosity, damping, unbalanced)
     growing = material if friction_angle is None else replace(material, friction_angle=friction_angle)
     start = cloud(n, sizes, box, _SPARSE if porosity is None else max(_SPARSE, porosity), seed)
-    dem = DEM(start, growing, damping=damping, threads=threads)
+    dem = DEM(start, growing, damping=damping)
     run = StridedRun(dem, report)
     if stress is None:
         assert porosity is not None  # _check_growth has seen to it

@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from porefv.dem.contacts import grain_contacts, wall_contacts
+from porefv.dem.contacts import StepParameters, grain_contacts, wall_contacts
+from porefv.dem.grain_state import GrainPairs, Grains, Listing, MovingWalls, WallPairs
 from porefv.packing.box import WALL_AXES, WALL_SENSES
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel
+from porefv.system.threads import for_rows, thread_count
 
 # Why `advance` came back.
 DONE, CROWDED, RUNAWAY = 0, 1, 2
@@ -44,15 +46,35 @@ class Loads(NamedTuple):
     thrusts: np.ndarray
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def advance(steps, half, parameters, grains, pairs, wall_pairs, walls, listing, loads, work):
-    """Take at most so many steps.
+class Found(NamedTuple):
+    """What each range finds in a step.
 
-    Parameters
+    Attributes
     ----------
-    steps : int
-    half : int
-        WHOLE, or FORCES and then MOTION to see the loads before they move anything, of one step.
+    sliding, damped : (s,) arrays
+        Energies dissipated by sliding, and taken by damping [J].
+    far : (s,) array
+        Largest square of a distance that a grain has moved since the pairs were listed [m²].
+    runaway : (s,) bool array
+        Whether any grain is faster than the fastest allowed, or nowhere.
+    """
+
+    sliding: np.ndarray
+    damped: np.ndarray
+    far: np.ndarray
+    runaway: np.ndarray
+
+    @classmethod
+    def of(cls, ranges: int) -> Found:
+        """Room for so many ranges."""
+        return cls(np.zeros(ranges), np.zeros(ranges), np.zeros(ranges), np.zeros(ranges, bool))
+
+
+class Motion(NamedTuple):
+    """All that a step of a DEM changes, or reads.
+
+    Attributes
+    ----------
     parameters : StepParameters
     grains : Grains
     pairs : GrainPairs
@@ -61,8 +83,31 @@ def advance(steps, half, parameters, grains, pairs, wall_pairs, walls, listing, 
     listing : Listing
     loads : Loads
         Of contacts: zero before FORCES and after MOTION.
+    found : Found
     work : (3,) array
         Energies added to: dissipated by sliding, put in by walls, taken by damping [J].
+    """
+
+    parameters: StepParameters
+    grains: Grains
+    pairs: GrainPairs
+    wall_pairs: WallPairs
+    walls: MovingWalls
+    listing: Listing
+    loads: Loads
+    found: Found
+    work: np.ndarray
+
+
+def advance(steps: int, half: int, motion: Motion) -> tuple[int, int]:
+    """Take at most so many steps.
+
+    Parameters
+    ----------
+    steps : int
+    half : int
+        WHOLE, or FORCES and then MOTION to see the loads before they move anything, of one step.
+    motion : Motion
 
     Returns
     -------
@@ -70,41 +115,80 @@ def advance(steps, half, parameters, grains, pairs, wall_pairs, walls, listing, 
     reason : int
         DONE, CROWDED where pairs must be listed anew, or RUNAWAY.
     """
-    n = grains.motion.shape[0]
-    ranges = wall_pairs.ranges.shape[0] - 1
-    sliding = np.zeros(ranges)
-    damped = np.zeros(ranges)
-    far = np.zeros(ranges)
-    runaway = np.zeros(ranges, np.bool_)
-    bounds = np.zeros(ranges + 1, np.int64)
-    for s in range(ranges + 1):
-        bounds[s] = n * s // ranges
+    ranges = len(motion.found.far)
+    if ranges == 1 or thread_count() == 1:
+        return _advance(steps, half, motion)
     for step in range(steps):
         if half != MOTION:
-            for s in prange(ranges):
-                sliding[s] = grain_contacts(
-                    pairs.ranges[s], pairs.ranges[s + 1], parameters, grains, pairs, loads.grains[s]
-                )
-                sliding[s] += wall_contacts(
-                    wall_pairs.ranges[s], wall_pairs.ranges[s + 1], parameters, grains, wall_pairs, walls,
-                    loads.grains[s], loads.walls[s],
-                )  # fmt: skip
-            work[0] += sliding.sum()
-            _weigh_walls(parameters, walls, loads)
+            for_rows(_find_loads, ranges, motion, least=1)
+            _end_loads(motion)
         if half == FORCES:
             return 0, DONE
-        _move_walls(parameters, walls, loads, work)
-        for s in prange(ranges):
-            damped[s], far[s], runaway[s] = _move(bounds[s], bounds[s + 1], parameters, grains, loads, listing.centres)
-        reason = _look(damped, far, runaway, walls, listing, work)
+        _move_walls(motion)
+        for_rows(_move, ranges, motion, least=1)
+        reason = _look(motion)
         if reason != DONE:
             return step + 1, reason
     return steps, DONE
 
 
-@njit(cache=True, nogil=True)
-def _look(damped, far, runaway, walls, listing, work):
+@kernel(error_model="numpy")
+def _advance(steps, half, motion):
+    """The same by one thread."""
+    ranges = motion.found.far.shape[0]
+    for step in range(steps):
+        if half != MOTION:
+            _find_loads(0, ranges, motion)
+            _end_loads(motion)
+        if half == FORCES:
+            return 0, DONE
+        _move_walls(motion)
+        _move(0, ranges, motion)
+        reason = _look(motion)
+        if reason != DONE:
+            return step + 1, reason
+    return steps, DONE
+
+
+@kernel(error_model="numpy")
+def _find_loads(first, last, motion):
+    """Loads of the contacts in ranges first ... last - 1."""
+    parameters, grains, pairs, wall_pairs, walls, _, loads, found, _ = motion
+    for s in range(first, last):
+        found.sliding[s] = grain_contacts(
+            pairs.ranges[s], pairs.ranges[s + 1], parameters, grains, pairs, loads.grains[s]
+        )
+        found.sliding[s] += wall_contacts(
+            wall_pairs.ranges[s], wall_pairs.ranges[s + 1], parameters, grains, wall_pairs, walls,
+            loads.grains[s], loads.walls[s],
+        )  # fmt: skip
+
+
+@kernel(error_model="numpy")
+def _end_loads(motion):
+    """Add up what the ranges have found, and weigh the walls."""
+    for s in range(motion.found.sliding.shape[0]):
+        motion.work[0] += motion.found.sliding[s]
+    _weigh_walls(motion.parameters, motion.walls, motion.loads)
+
+
+@kernel(error_model="numpy")
+def _move(first, last, motion):
+    """Velocities and places of the grains in ranges first ... last - 1 after a step."""
+    found = motion.found
+    ranges, n = found.far.shape[0], motion.grains.motion.shape[0]
+    for s in range(first, last):
+        found.damped[s], found.far[s], found.runaway[s] = _move_grains(
+            n * s // ranges, n * (s + 1) // ranges, motion.parameters, motion.grains, motion.loads,
+            motion.listing.centres,
+        )  # fmt: skip
+
+
+@kernel
+def _look(motion):
     """Add up what the ranges have found; whether to go on."""
+    damped, far, runaway = motion.found.damped, motion.found.far, motion.found.runaway
+    walls, listing, work = motion.walls, motion.listing, motion.work
     farthest = 0.0
     lost = False
     for s in range(far.shape[0]):
@@ -121,8 +205,8 @@ def _look(damped, far, runaway, walls, listing, work):
     return CROWDED if farthest + max(moved, farthest) > listing.slack else DONE
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _move(first, last, parameters, grains, loads, start):
+@helper(error_model="numpy")
+def _move_grains(first, last, parameters, grains, loads, start):
     """Velocities and places of grains first ... last - 1 after a step; takes their loads.
 
     Returns the energy taken by damping, the largest square of a distance moved since `start` (n, 3), and whether any
@@ -182,14 +266,14 @@ def _move(first, last, parameters, grains, loads, start):
     return damped, far, runaway
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _damp(acceleration, velocity, damping, dt):
     """The acceleration less its damped part, against the velocity, and the energy per mass that this takes."""
     drag = -damping * abs(acceleration) * np.sign(velocity)
     return acceleration + drag, -drag * (velocity + 0.5 * dt * (acceleration + drag)) * dt
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@helper(error_model="numpy")
 def _weigh_walls(parameters, walls, loads):
     """Forces of the grains on the walls, and how far pressing walls yield, no faster than their top speed."""
     dt, gain = parameters.dt, parameters.gain
@@ -214,7 +298,7 @@ def _weigh_walls(parameters, walls, loads):
             yields[w] = gain / (stiffness * dt)
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _excess(w, walls):
     """Outward force on wall w beyond the stress it presses with [N]; NaN where that is not given."""
     places = walls.places
@@ -225,9 +309,10 @@ def _excess(w, walls):
     return WALL_SENSES[w] * walls.forces[w, axis] - walls.targets[w] * section
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _move_walls(parameters, walls, loads, work):
+@kernel(error_model="numpy")
+def _move_walls(motion):
     """Walls of given velocity move on; those of given stress towards balance."""
+    parameters, walls, loads, work = motion.parameters, motion.walls, motion.loads, motion.work
     dt, velocities = parameters.dt, walls.velocities
     for w in range(6):
         if not np.isnan(walls.targets[w]):
@@ -239,7 +324,7 @@ def _move_walls(parameters, walls, loads, work):
             work[1] -= walls.forces[w, a] * velocities[w, a] * dt
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def free_motion(parameters, grains, walls, loads):
     """What grains and walls would do after a step under the loads there are, without moving them.
 

@@ -11,7 +11,7 @@ from porefv.errors import InputError
 from porefv.packing.box import Box
 from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 from porefv.system.number_checks import is_finite_number
 
 # Places tried in a cloud, for each grain, before it counts as full.
@@ -74,7 +74,7 @@ def _place(radii: np.ndarray, size: np.ndarray, rng: np.random.Generator, tries:
     return _add_in_turn(radii, size, level, cells, firsts, heads, rng, tries)
 
 
-@njit(cache=True)
+@kernel
 def _add_in_turn(radii, size, level, cells, firsts, heads, rng, tries):
     """Random sequential addition. heads: last grain of each cell, -1 if none; chains lead on from there."""
     n = radii.shape[0]

@@ -17,8 +17,9 @@ from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES
 from porefv.packing.overlaps import sphere_volumes
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 from porefv.system.number_checks import three_numbers
+from porefv.system.threads import for_rows
 
 # Throats whose forces are in memory at a time.
 BLOCK = 1 << 16
@@ -214,7 +215,9 @@ def _unit_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> Iterato
             drag=fractions[rows, :, None] * vectors[rows, None, :],
         )
         if split == "drag" and first >= 0:
-            apply_pressure_along_throats(
+            for_rows(
+                apply_pressure_along_throats,
+                len(block),
                 block,
                 throats.facets_of_throats,
                 mesh.facets.planes,
@@ -226,7 +229,7 @@ def _unit_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> Iterato
         yield rows, forces
 
 
-@njit(cache=True)
+@kernel
 def _sheared(weights, volumes, surfaces, roundness, facet_vertices, vertices):
     """(f, 3): wetted surfaces times the shear on them, relative to a narrow throat: √(1 + (c R_h / r)²), on walls λ.
 
@@ -246,7 +249,7 @@ def _sheared(weights, volumes, surfaces, roundness, facet_vertices, vertices):
     return sheared
 
 
-@njit(cache=True)
+@kernel
 def _positive_sum(weights):
     """(f,): sum of the positive weights of each facet."""
     sums = np.zeros(weights.shape[0])
@@ -256,7 +259,7 @@ def _positive_sum(weights):
     return sums
 
 
-@njit(cache=True)
+@kernel
 def _drag_fractions(weights, sums, facets):
     """(f, 3): γ^k / Σγ, the negative γ^k that a signed decomposition can give taken as zero.
 
@@ -269,7 +272,7 @@ def _drag_fractions(weights, sums, facets):
     return fractions
 
 
-@njit(cache=True)
+@kernel
 def _scatter(facet_vertices, drops, forces, pressure, viscous):
     """Add the forces on every facet's vertices, for its pressure drop, to `pressure` and `viscous` (n + 6, 3) [N]."""
     for f in range(facet_vertices.shape[0]):

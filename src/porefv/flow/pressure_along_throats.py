@@ -19,7 +19,7 @@ import numpy as np
 
 from porefv.conductance.section_friction.friction_kernels import STRETCH
 from porefv.mesh.vectors import cross_product, dot, minus, towards, unit, vector_at
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 # Points on each triangle, towards its pore's vertex and across: 3 % of what they move, in the mean square.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(2)
@@ -61,12 +61,16 @@ class Fall(NamedTuple):
     drop: float
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def apply_pressure_along_throats(which, throats, facets, vertices, laguerre_vertices, drops, pressure, drag):
+@kernel(error_model="numpy")
+def apply_pressure_along_throats(
+    first, last, which, throats, facets, vertices, laguerre_vertices, drops, pressure, drag
+):
     """Move the part of the drag that is pressure along the throats from `drag` to `pressure`.
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     which : (u,) int array
         Consecutive throats to treat.
     throats : ThroatFacets
@@ -80,7 +84,7 @@ def apply_pressure_along_throats(which, throats, facets, vertices, laguerre_vert
         to in place [m²]. Their sum stays.
     """
     n, points, _ = vertices
-    for i in prange(which.shape[0]):
+    for i in unsigned_range(first, last):
         start = throats.starts[which[i]]
         own = throats.facets[start : throats.starts[which[i] + 1]]
         row = start - throats.starts[which[0]]
@@ -90,12 +94,12 @@ def apply_pressure_along_throats(which, throats, facets, vertices, laguerre_vert
             continue
         scale = STRETCH / height
         normal = vector_at(f, facets.normals)
-        first = vector_at(facets.vertices[f, 0], points)
+        origin = vector_at(facets.vertices[f, 0], points)
         # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
         pi = vector_at(facets.cells[f, 0], laguerre_vertices)
         pj = vector_at(facets.cells[f, 1], laguerre_vertices)
-        low = min(_fall(scale * dot(minus(pi, first), normal), 1.0), 0.0)
-        high = max(_fall(scale * dot(minus(pj, first), normal), 1.0), 0.0)
+        low = min(_fall(scale * dot(minus(pi, origin), normal), 1.0), 0.0)
+        high = max(_fall(scale * dot(minus(pj, origin), normal), 1.0), 0.0)
         if not high - low > 0.0:
             continue
         moved = np.zeros(3)
@@ -134,13 +138,13 @@ def apply_pressure_along_throats(which, throats, facets, vertices, laguerre_vert
                         pressure[row + j, v, axis] -= sense * moved[axis] / on_wall
 
 
-@njit(cache=True)
+@helper
 def _sense(f, first, facets):
     """1 where facet f has the sense of facet `first`, else -1."""
     return 1.0 if dot(vector_at(first, facets.normals), vector_at(f, facets.normals)) > 0.0 else -1.0
 
 
-@njit(cache=True)
+@helper
 def _wall_across(axis, own, facets, vertices):
     """How many of a throat's own facets stand on a wall across an axis.
 
@@ -156,7 +160,7 @@ def _wall_across(axis, own, facets, vertices):
     return count
 
 
-@njit(cache=True)
+@helper
 def _neighbours(k, which, own, facets):
     """The vertices before and after k around a throat, in the sense of its first facet; -1, -1 but for k's first facet.
 
@@ -185,7 +189,7 @@ def _neighbours(k, which, own, facets):
     return (after, before) if after >= 0 and before >= 0 else (-1, -1)
 
 
-@njit(cache=True)
+@helper
 def _place(k, f, facets):
     """Place of vertex k in facet f, -1 if it is none of its vertices."""
     for v in range(3):
@@ -194,7 +198,7 @@ def _place(k, f, facets):
     return -1
 
 
-@njit(cache=True)
+@helper
 def _around(v, f, first, facets):
     """The other two vertices of facet f, after and before its vertex v in the sense of facet `first`."""
     following = facets.vertices[f, (v + 1) % 3]
@@ -204,14 +208,14 @@ def _around(v, f, first, facets):
     return leading, following
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _fall(x, square):
     """Φ: friction from the neck to a height over it, of x / √square."""
     t = x / np.sqrt(square + x * x)
     return t - t * t * t / 3.0
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _patch(a, b, c, radius, normal, fall):
     """Force on a sphere's patch by the pressure's fall (`Fall`) between a pore's Laguerre vertex and the neck.
 

@@ -7,10 +7,10 @@ import numpy as np
 from porefv.mesh.facet_kernels import area_vector, centroid, spheres_first
 from porefv.mesh.laguerre import crosses_laguerre_plane, laguerre_plane_distances
 from porefv.mesh.vectors import cross_product, dot, towards, vector_at, wall_distance
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
-@njit(cache=True)
+@helper
 def _sorted_vertices(t, cells, n):
     """(4,) int32: vertices of cell t, the spheres first; and how many are spheres (vertices below n)."""
     s = np.empty(4, np.int32)
@@ -27,11 +27,10 @@ def _sorted_vertices(t, cells, n):
     return s, ns
 
 
-@njit(cache=True, parallel=True)
-def polyhedron_volumes(cells, vertices):
-    """Volume of each cell: its spheres' centres swept to its walls."""
-    volumes = np.empty(cells.shape[0])
-    for t in prange(cells.shape[0]):
+@kernel
+def polyhedron_volumes(first, last, cells, vertices, volumes):
+    """Fill the volumes (m,) of cells first ... last - 1: spheres' centres swept to walls."""
+    for t in unsigned_range(first, last):
         s, ns = _sorted_vertices(t, cells, vertices.n_spheres)
         if ns == 4:
             u = cross_product(towards(s[0], s[1], vertices), towards(s[0], s[2], vertices))
@@ -56,18 +55,16 @@ def polyhedron_volumes(cells, vertices):
             volumes[t] = 1.0
             for i in range(1, 4):
                 volumes[t] *= wall_distance(s[0], s[i], vertices)
-    return volumes
 
 
-@njit(cache=True, parallel=True)
-def volume_gradients(cells, vertices):
-    """(m, 4, 3): derivative of the volume of each cell by the place of each of its vertices.
+@kernel
+def volume_gradients(first, last, cells, vertices, gradients):
+    """Fill in the derivatives (m, 4, 3) of the volumes of cells first ... last - 1 by the place of each vertex.
 
     A wall's place is that along its outward normal: its derivative, a vector along that, is the area of the cell's
     face on it.
     """
-    gradients = np.empty((cells.shape[0], 4, 3))
-    for t in prange(cells.shape[0]):
+    for t in unsigned_range(first, last):
         s, ns = _sorted_vertices(t, cells, vertices.n_spheres)
         by = _gradients_by_vertex(s, ns, vertices)
         for i in range(4):
@@ -75,10 +72,9 @@ def volume_gradients(cells, vertices):
                 if s[j] == cells[t, i]:
                     for axis in range(3):
                         gradients[t, i, axis] = by[j, axis]
-    return gradients
 
 
-@njit(cache=True)
+@helper
 def _gradients_by_vertex(s, ns, vertices):
     """(4, 3): derivatives of one cell's volume; spheres come first in s."""
     by = np.zeros((4, 3))
@@ -136,24 +132,23 @@ def _gradients_by_vertex(s, ns, vertices):
     return by
 
 
-@njit(cache=True)
+@helper
 def _add(by, i, factor, vector):
     for axis in range(3):
         by[i, axis] += factor * vector[axis]
 
 
-@njit(cache=True)
+@helper
 def _add_difference(by, i, factor, vector):
     """Derivative by the way from the first vertex to vertex i."""
     _add(by, i, factor, vector)
     _add(by, 0, -factor, vector)
 
 
-@njit(cache=True, parallel=True)
-def cell_solids(cells, vertices):
-    """Volume of the balls, each cut by its Laguerre planes, within each cell."""
-    solids = np.zeros(cells.shape[0])
-    for t in prange(cells.shape[0]):
+@kernel
+def cell_solids(first, last, cells, vertices, solids):
+    """Fill in the volume (m,) of the balls, each cut by its Laguerre planes, in cells first ... last - 1."""
+    for t in unsigned_range(first, last):
         total = 0.0
         for i in range(4):
             k = cells[t, i]
@@ -178,10 +173,9 @@ def cell_solids(cells, vertices):
                 h = r - d
                 total -= psi * h * h * (3.0 * r - h) / 6.0
         solids[t] = total
-    return solids
 
 
-@njit(cache=True)
+@kernel
 def enumerate_wall_faces(cells, vertices):
     """Face of each cell on each of its walls: the facet opposite to the wall, projected on it."""
     n = vertices.n_spheres
@@ -213,7 +207,7 @@ def enumerate_wall_faces(cells, vertices):
     return face_cells, walls, areas, centroids
 
 
-@njit(cache=True)
+@helper
 def _tangent(u, v, w):
     """(numerator, denominator) of tan(Ω/2) for the triangle u, v, w (Van Oosterom and Strackee 1983)."""
     lu = np.sqrt(dot(u, u))

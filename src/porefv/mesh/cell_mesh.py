@@ -15,6 +15,7 @@ from porefv.packing.box import WALL_NORMALS, Box
 from porefv.packing.memory_estimate import ensure_room_for_spheres
 from porefv.packing.packing import Packing
 from porefv.system.lazy import FixedInputs, lazy_property
+from porefv.system.threads import for_rows
 from porefv.tessellation.triangulation import RegularTriangulation, wall_offsets
 from porefv.tessellation.vertices import Vertices
 
@@ -135,7 +136,9 @@ class CellMesh(FixedInputs):
     @lazy_property
     def cell_volumes(self) -> np.ndarray:
         """(m,): volume of each cell, tetrahedron, wedge or hexahedron; they fill the box [m³]."""
-        return polyhedron_volumes(self.cells, self.cell_vertices)
+        volumes = np.empty(self.n_cells)
+        for_rows(polyhedron_volumes, self.n_cells, self.cells, self.cell_vertices, volumes)
+        return volumes
 
     def cell_volume_rates(self, velocities: np.ndarray, wall_speeds: np.ndarray) -> np.ndarray:
         """Rate of the volume of each cell where spheres and walls move, at fixed topology (C14 eq. 25).
@@ -163,12 +166,16 @@ class CellMesh(FixedInputs):
 
         A wall's place is that along its outward normal: its derivative is the cell's face on it, times that normal.
         """
-        return volume_gradients(self.cells, self.cell_vertices)
+        gradients = np.empty((self.n_cells, 4, 3))
+        for_rows(volume_gradients, self.n_cells, self.cells, self.cell_vertices, gradients)
+        return gradients
 
     @lazy_property
     def cell_void_volumes(self) -> np.ndarray:
         """(m,): volume of each cell outside the spheres [m³]."""
-        return self.cell_volumes - cell_solids(self.cells, self.cell_vertices)
+        solids = np.empty(self.n_cells)
+        for_rows(cell_solids, self.n_cells, self.cells, self.cell_vertices, solids)
+        return self.cell_volumes - solids
 
     @lazy_property
     def laguerre_volumes(self) -> np.ndarray:

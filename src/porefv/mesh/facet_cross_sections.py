@@ -13,7 +13,7 @@ import numpy as np
 from porefv.mesh.facet_kernels import area_factor, facet_angles, frame_of
 from porefv.mesh.laguerre import crosses_laguerre_plane, laguerre_plane_distances
 from porefv.mesh.vectors import dot, minus, times, vector_at
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class CrossSections(NamedTuple):
@@ -43,12 +43,14 @@ class CrossSections(NamedTuple):
     covered: np.ndarray
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def facet_cross_sections(facets, laguerre_vertices, vertices, found):
+@kernel(error_model="numpy")
+def facet_cross_sections(first, last, facets, laguerre_vertices, vertices, found):
     """Fill the `CrossSections` of the facets (`FacetTopology`); `laguerre_vertices` (m, 3) are those of the cells.
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     facets : FacetTopology
     laguerre_vertices : (m, 3) float64 array
         Laguerre vertex of each cell, from the local origin [m].
@@ -57,11 +59,11 @@ def facet_cross_sections(facets, laguerre_vertices, vertices, found):
     found : CrossSections
         Arrays to fill.
     """
-    for f in prange(facets.cells.shape[0]):
+    for f in unsigned_range(first, last):
         _cross_section(f, facets, laguerre_vertices, vertices, found)
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _cross_section(f, facets, laguerre_vertices, vertices, found):
     """Fill row f."""
     frame = frame_of(f, facets, vertices)
@@ -84,7 +86,7 @@ def _cross_section(f, facets, laguerre_vertices, vertices, found):
         found.normals[f, axis] = normal[axis]
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _sectors(frame, vertices):
     """A^k of each vertex: its sector, less what lies beyond the Laguerre planes towards the other two [m²]."""
     n, _, sizes = vertices
@@ -101,7 +103,7 @@ def _sectors(frame, vertices):
     return of_a, of_b, of_c
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _half_segments(k, m, u, vertices):
     """Areas of the sectors of sphere k and vertex m beyond the Laguerre plane between them; u leads from k to m."""
     if not crosses_laguerre_plane(k, m, u, vertices):
@@ -111,7 +113,7 @@ def _half_segments(k, m, u, vertices):
     return _half_segment(vertices.sizes[k], d), of_m
 
 
-@njit(cache=True)
+@helper
 def _half_segment(r, d):
     """Half the part of a disc of radius r beyond a chord at distance d from its centre."""
     chord = np.sqrt((r - d) * (r + d))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, vector_at, wall_distance
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel
 
 
 class FacetTopology(NamedTuple):
@@ -70,7 +70,7 @@ class Frame(NamedTuple):
     twice: float
 
 
-@njit(cache=True)
+@helper
 def spheres_first(a, b, c, n):
     """The three vertices turned, in cyclic order, until the spheres, which are below n, come first.
 
@@ -86,7 +86,7 @@ def spheres_first(a, b, c, n):
     return a, b, c
 
 
-@njit(cache=True)
+@kernel
 def enumerate_facets(cells, neighbours, n, facets):
     """Fill the `FacetTopology` with the facets between cells t < u, in the order of t; n is the number of spheres.
 
@@ -122,7 +122,7 @@ def enumerate_facets(cells, neighbours, n, facets):
             f += 1
 
 
-@njit(cache=True)
+@helper
 def facet_frame(a, b, c, vertices):
     """`Frame` of the facet with these vertices, spheres first.
 
@@ -138,13 +138,13 @@ def facet_frame(a, b, c, vertices):
     return Frame(a, b, c, ab, ac, cross, np.sqrt(dot(cross, cross)))
 
 
-@njit(cache=True)
+@helper
 def frame_of(f, facets, vertices):
     """`Frame` of facet f."""
     return facet_frame(facets.vertices[f, 0], facets.vertices[f, 1], facets.vertices[f, 2], vertices)
 
 
-@njit(cache=True)
+@helper
 def area_factor(frame, vertices):
     """Area of a facet over |ab × ac|: of a triangle ½ [-], of a trapezoid its mean height, of a rectangle its area."""
     a, b, c = frame.a, frame.b, frame.c
@@ -155,7 +155,7 @@ def area_factor(frame, vertices):
     return wall_distance(a, b, vertices) * wall_distance(a, c, vertices)
 
 
-@njit(cache=True)
+@helper
 def area_vector(a, b, c, vertices):
     """Area vector of a facet: triangle, trapezoid or rectangle [m²].
 
@@ -169,7 +169,7 @@ def area_vector(a, b, c, vertices):
     return times(area_factor(frame, vertices), frame.cross)
 
 
-@njit(cache=True)
+@helper
 def facet_angles(frame, n):
     """Angles of a facet at its three vertices, 0 at walls, which are from n on."""
     if frame.b >= n:
@@ -181,7 +181,7 @@ def facet_angles(frame, n):
     return at_a, at_b, np.pi - at_a - at_b
 
 
-@njit(cache=True)
+@kernel
 def centroid(a, b, c, vertices):
     """Centroid of a facet, from the local origin [m].
 
@@ -205,7 +205,7 @@ def centroid(a, b, c, vertices):
     return plus(along, times(t, towards(a, c, vertices)))
 
 
-@njit(cache=True)
+@kernel
 def facet_centroids(facet_vertices, vertices):
     """(f, 3): centroid of each facet [m]."""
     centres = np.empty((facet_vertices.shape[0], 3))
@@ -216,10 +216,10 @@ def facet_centroids(facet_vertices, vertices):
     return centres
 
 
-@njit(cache=True, parallel=True)
+@kernel
 def row_sums(values):
     """(f,): sum of the three values of each row."""
     sums = np.empty(values.shape[0])
-    for f in prange(values.shape[0]):
+    for f in range(values.shape[0]):
         sums[f] = values[f, 0] + values[f, 1] + values[f, 2]
     return sums

@@ -20,7 +20,7 @@ import numpy as np
 from porefv.mesh.facet_kernels import area_factor, frame_of
 from porefv.mesh.laguerre import crosses_laguerre_plane, laguerre_plane_distances
 from porefv.mesh.vectors import cross_product, dot, minus, times, vector_at, wall_distance
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class Ends(NamedTuple):
@@ -56,14 +56,16 @@ class Caps(NamedTuple):
     of_m: float
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def facet_volumes(facets, laguerre_vertices, vertices, volumes, surfaces):
+@kernel(error_model="numpy")
+def facet_volumes(first, last, facets, laguerre_vertices, vertices, volumes, surfaces):
     """Void volume φ of each throat and the solid surface γ^k of each of its vertices, walls included.
 
     Solid angles, heights and φ are signed: positive where P_j is further along the normal than P_i.
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     facets : FacetTopology
     laguerre_vertices : (m, 3) array
         Laguerre vertex of each cell [m].
@@ -71,7 +73,7 @@ def facet_volumes(facets, laguerre_vertices, vertices, volumes, surfaces):
     volumes, surfaces : (f,), (f, 3) arrays
         To be filled [m³, m²].
     """
-    for f in prange(facets.cells.shape[0]):
+    for f in unsigned_range(first, last):
         n, points, sizes = vertices
         frame = frame_of(f, facets, vertices)
         a, b, c, ab, ac, cross, twice = frame
@@ -99,7 +101,7 @@ def facet_volumes(facets, laguerre_vertices, vertices, volumes, surfaces):
         surfaces[f, 2] = gamma_c + 0.5 * length * on_c - caps_bc.of_m - caps_ca.of_m
 
 
-@njit(cache=True)
+@helper
 def _wall_edges(frame, vertices):
     """Lengths of a facet's edges on the walls that b and c may be; 0 for spheres [m]."""
     a, b, c, ab, ac, _, _ = frame
@@ -111,13 +113,13 @@ def _wall_edges(frame, vertices):
     return wall_distance(a, c, vertices), wall_distance(a, b, vertices)
 
 
-@njit(cache=True)
+@helper
 def _moved(ends, u):
     """The ends as seen from a point of the facet's plane that is u away."""
     return Ends(minus(ends.pi, u), minus(ends.pj, u), ends.hi, ends.hj)
 
 
-@njit(cache=True)
+@helper
 def _solid_angle(u, v, ends):
     """Signed solid angle of (u, v, P_j) less that of (u, v, P_i); the heights are (u × v)·P.
 
@@ -131,7 +133,7 @@ def _solid_angle(u, v, ends):
     return 2.0 * _angle_between(di, hi, dj, hj)
 
 
-@njit(cache=True)
+@helper
 def _angle_between(xi, yi, xj, yj):
     """Angle of (xj, yj) less that of (xi, yi), each within ±180°."""
     if xi > 0.0 and xj > 0.0:  # both within ±90°: one arctangent gives the difference
@@ -139,7 +141,7 @@ def _angle_between(xi, yi, xj, yj):
     return np.arctan2(yj, xj) - np.arctan2(yi, xi)
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _caps(k, m, u, edge, cross, ends, vertices):
     """`Caps` of sphere k and vertex m; none where k does not reach their Laguerre plane.
 

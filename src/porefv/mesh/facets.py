@@ -10,6 +10,7 @@ from porefv.mesh.facet_cross_sections import CrossSections, facet_cross_sections
 from porefv.mesh.facet_kernels import FacetPlanes, FacetTopology, enumerate_facets, facet_centroids
 from porefv.mesh.facet_volumes import facet_volumes
 from porefv.system.lazy import FixedInputs, lazy_property
+from porefv.system.threads import for_rows
 
 if TYPE_CHECKING:
     from porefv.mesh.cell_mesh import CellMesh
@@ -68,7 +69,7 @@ class Facets(FixedInputs):
             normals=np.empty((f, 3)), lengths=np.empty(f), areas=np.empty(f), fluid_areas=np.empty(f),
             sectors=np.empty((f, 3)), covered=np.empty(f, bool),
         )  # fmt: skip
-        facet_cross_sections(self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, found)
+        for_rows(facet_cross_sections, f, self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, found)
         return found
 
     @property
@@ -116,7 +117,15 @@ class Facets(FixedInputs):
     @lazy_property
     def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
         volumes, surfaces = np.empty(len(self)), np.empty((len(self), 3))
-        facet_volumes(self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes, surfaces)
+        for_rows(
+            facet_volumes,
+            len(self),
+            self.topology,
+            self.mesh.local_vertices,
+            self.mesh.cell_vertices,
+            volumes,
+            surfaces,
+        )
         return volumes, surfaces
 
     @property

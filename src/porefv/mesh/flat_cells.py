@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 # A cell whose edges enclose less than this part of the volume of their lengths is flat but for rounding.
 _FLAT = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def settle_flat_cells(cells, neighbours, vertices, laguerre_vertices):
     """Give each flat cell the Laguerre vertex of a neighbour, in place in `laguerre_vertices` (m, 3).
 
@@ -58,7 +58,7 @@ def settle_flat_cells(cells, neighbours, vertices, laguerre_vertices):
         count -= settled
 
 
-@njit(cache=True)
+@helper
 def _is_flat(cell, vertices):
     """Whether the directions from a sphere of the cell to its other vertices lie in a plane, but for rounding."""
     n, points, _ = vertices

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, unit, vector_at, wall_distance
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class Circles(NamedTuple):
@@ -25,8 +25,8 @@ class Circles(NamedTuple):
     centres: np.ndarray
 
 
-@njit(cache=True, parallel=True)
-def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
+@kernel
+def inscribed_circles(first, last, facet_vertices, vertices, slip, radii, centres):
     """Fill radii and centres of the circle in each facet's plane tangent to its spheres and no-slip walls (`Circles`).
 
     On walls with slip, (6,) bool, a circle is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that
@@ -34,6 +34,8 @@ def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     facet_vertices : (f, 3) int32 array
         Vertices of each facet, spheres first.
     vertices : Vertices
@@ -45,7 +47,7 @@ def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
         To fill, from the local origin [m].
     """
     n, points, sizes = vertices
-    for f in prange(facet_vertices.shape[0]):
+    for f in unsigned_range(first, last):
         a = facet_vertices[f, 0]
         rows = np.empty((2, 2))
         constant = np.empty(2)
@@ -85,12 +87,14 @@ def inscribed_circles(facet_vertices, vertices, slip, radii, centres):
                     centres[f, axis] = points[a, axis] + (x0 + rho * x1) * e1[axis] + (y0 + rho * y1) * e2[axis]
 
 
-@njit(cache=True, parallel=True)
-def circle_portions(facet_vertices, vertices, circles, portions):
+@kernel
+def circle_portions(first, last, facet_vertices, vertices, circles, portions):
     """Fill `portions` (f,) with the part of each circle's area that lies within the facet; 0 for a radius of zero.
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     facet_vertices : (f, 3) int32 array
         Vertices of each facet, spheres first.
     vertices : Vertices
@@ -100,7 +104,7 @@ def circle_portions(facet_vertices, vertices, circles, portions):
     """
     n = vertices.n_spheres
     radii = circles.radii
-    for f in prange(facet_vertices.shape[0]):
+    for f in unsigned_range(first, last):
         portions[f] = 0.0
         if radii[f] <= 0.0:
             continue
@@ -142,7 +146,7 @@ def circle_portions(facet_vertices, vertices, circles, portions):
         portions[f] = abs(area) / np.pi
 
 
-@njit(cache=True)
+@helper
 def _axes(f, facet_vertices, vertices):
     """Two unit vectors in a facet's plane, at right angles in its sense."""
     a = facet_vertices[f, 0]
@@ -151,7 +155,7 @@ def _axes(f, facet_vertices, vertices):
     return unit(u), unit(cross_product(normal, u))
 
 
-@njit(cache=True)
+@helper
 def _within_circle(p, q):
     """Area that the triangle from the origin to p and q has in common with the unit circle, signed as the triangle."""
     u = q[0] - p[0]
@@ -177,7 +181,7 @@ def _within_circle(p, q):
     return area
 
 
-@njit(cache=True)
+@helper
 def _sector(px, py, qx, qy):
     """Area of the unit circle's sector from the direction of p to that of q, signed."""
     return 0.5 * np.arctan2(px * qy - py * qx, px * qx + py * qy)

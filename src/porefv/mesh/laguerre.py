@@ -6,10 +6,10 @@ import numpy as np
 
 from porefv.mesh.facet_kernels import frame_of
 from porefv.mesh.vectors import cross_product, dot, minus, times, towards, unit, vector_at, wall_distance
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 
-@njit(cache=True)
+@helper
 def crosses_laguerre_plane(k, m, u, vertices):
     """Whether sphere k reaches beyond its Laguerre plane towards vertex m, to which u leads.
 
@@ -29,7 +29,7 @@ def crosses_laguerre_plane(k, m, u, vertices):
     return dot(u, u) < (sizes[k] + sizes[m]) * (sizes[k] + sizes[m])
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def laguerre_plane_distances(k, m, u, vertices):
     """Distances of centres k and m from the Laguerre plane between them, each within its radius [m].
 
@@ -53,7 +53,7 @@ def laguerre_plane_distances(k, m, u, vertices):
     return min(max(d, -r), r), min(max(beyond, -sizes[m]), sizes[m])
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def laguerre_feet(u, r, s):
     """Distances of the centres of two spheres of radii r and s, u apart, from the Laguerre plane between them."""
     square = dot(u, u)
@@ -62,7 +62,7 @@ def laguerre_feet(u, r, s):
     return d, length - d
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def laguerre_volumes(facets, laguerre_vertices, vertices):
     """(n,): volume of the Laguerre cell of each sphere [m³].
 

@@ -12,6 +12,7 @@ from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.inscribed_circles import Circles, circle_portions, inscribed_circles
 from porefv.mesh.uniting import tied_facets
 from porefv.system.lazy import FixedInputs, lazy_property
+from porefv.system.threads import for_rows
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
@@ -219,7 +220,7 @@ class Throats(FixedInputs):
         portions = np.zeros(len(mesh.facets.vertices))
         of_throat = self.facet_throat  # -1, the row appended below, within a pore
         circles = Circles(np.append(radii, 0.0)[of_throat], np.append(centres, np.zeros((1, 3)), axis=0)[of_throat])
-        circle_portions(mesh.facets.vertices, mesh.cell_vertices, circles, portions)
+        for_rows(circle_portions, len(portions), mesh.facets.vertices, mesh.cell_vertices, circles, portions)
         whole = 1.0 / self.mirror_images(slip)
         portions = np.where(radii > 0.0, np.clip(self._total(portions), 0.05 * whole, whole), whole)
         return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
@@ -239,7 +240,7 @@ class Throats(FixedInputs):
 
     def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> Circles:
         found = Circles(np.empty(len(vertices)), np.zeros((len(vertices), 3)))
-        inscribed_circles(vertices, self.mesh.cell_vertices, slip, *found)
+        for_rows(inscribed_circles, len(vertices), vertices, self.mesh.cell_vertices, slip, *found)
         return found
 
     @lazy_property

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from porefv.system.growing_arrays import doubled
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 from porefv.system.union_find import join
 
 
-@njit(cache=True)
+@kernel
 def unite(facets, laguerre_vertices, vertices, tolerance):
     """(m,): label of each cell, equal across facets whose Laguerre vertices nearly coincide.
 
@@ -50,7 +50,7 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
     return parent
 
 
-@njit(cache=True)
+@kernel
 def tied_facets(facet_cells, cell_node, cell_pore):
     """Facets between two pores both of whose Laguerre vertices are shared by several cells."""
     cells = np.zeros(cell_node.max() + 1, np.int32)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel
+from porefv.system.threads import for_rows
 
 # More neighbours per sphere than this, over a whole cell, cannot come from a packing of grains; it comes from
 # radii and centres in different units, and listing the pairs would exhaust the memory.
@@ -59,7 +60,9 @@ def neighbour_pairs(centres: ArrayLike, radii: ArrayLike, gap: float = 0.0) -> N
     spheres = np.column_stack((centres, radii))[order]
 
     none = np.empty(0, dtype=np.int64)
-    counts = _pairs_by_cell(cells, starts, table, levels, spheres, order, gap, none, none)
+    counts = np.empty(len(cells), np.int64)
+    gap = float(gap)
+    for_rows(_pairs_by_cell, len(cells), cells, starts, table, levels, spheres, order, gap, none, none, counts)
     crowded = counts > CROWDED * np.diff(starts)
     if crowded.any():
         culprit = order[starts[np.flatnonzero(crowded)[0]]]
@@ -69,7 +72,8 @@ def neighbour_pairs(centres: ArrayLike, radii: ArrayLike, gap: float = 0.0) -> N
         )
     ends = np.cumsum(counts)
     found = np.empty(ends[-1], dtype=np.int64)
-    _pairs_by_cell(cells, starts, table, levels, spheres, order, gap, ends - counts, found)
+    firsts = ends - counts
+    for_rows(_pairs_by_cell, len(cells), cells, starts, table, levels, spheres, order, gap, firsts, found, counts)
     found.sort()
     return np.column_stack((found >> 32, found & 0xFFFFFFFF)).astype(np.int32)
 
@@ -110,14 +114,14 @@ def _floor_log2(x):
     return np.frexp(x)[1] - 1
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _slot(key, size):
     """Where the search for a key starts: Fibonacci hashing into a table whose size is a power of two."""
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     return np.int64((mixed >> np.uint64(32)) & np.uint64(size - 1))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _hash_table(cells):
     """Open-addressing table of the positions of the occupied cells, at most half full, -1 where free."""
     size = 2
@@ -132,7 +136,7 @@ def _hash_table(cells):
     return table
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _find(key, cells, table):
     """Position of the cell with this key, or -1 if it is empty."""
     slot = _slot(key, len(table))
@@ -143,7 +147,7 @@ def _find(key, cells, table):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _pairs_of_two_cells(a, b, starts, spheres, order, gap, first, most, found):
     """Number of pairs between cells a and b (or within a, if they are the same).
 
@@ -166,15 +170,14 @@ def _pairs_of_two_cells(a, b, starts, spheres, order, gap, first, most, found):
     return count
 
 
-@njit(cache=True, parallel=True, nogil=True)
-def _pairs_by_cell(cells, starts, table, levels, spheres, order, gap, firsts, found):
-    """Number of pairs each cell finds in itself, in cells after it in its level, and in coarser levels.
+@kernel
+def _pairs_by_cell(begin, end, cells, starts, table, levels, spheres, order, gap, firsts, found, counts):
+    """Fill in how many pairs cells begin ... end - 1 find in themselves, in cells after them, and in coarser levels.
 
     Called twice: with empty `firsts` and `found` to count, then to write the pairs of cell c from
     ``firsts[c]`` on.
     """
-    counts = np.zeros(len(cells), dtype=np.int64)
-    for c in prange(len(cells)):
+    for c in range(begin, end):
         level = cells[c] >> (3 * _AXIS_BITS)
         x = cells[c] & _AXIS_MASK
         y = (cells[c] >> _AXIS_BITS) & _AXIS_MASK
@@ -204,4 +207,3 @@ def _pairs_by_cell(cells, starts, table, levels, spheres, order, gap, firsts, fo
                                 c, other, starts, spheres, order, gap, first + count, most - count, found
                             )
         counts[c] = count
-    return counts

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from porefv.packing.box import WALL_AXES, WALL_SENSES
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 
-@njit(cache=True)
+@kernel
 def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
     """How many triples have a point in common, and a bound on the sum of the volumes that they share.
 
@@ -60,7 +60,7 @@ def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
     return count, shared
 
 
-@njit(cache=True)
+@helper
 def _meet(i, j, k, centres, radii):
     """Whether three balls, no one within another, have a point in common.
 
@@ -90,7 +90,7 @@ def _meet(i, j, k, centres, radii):
     return False
 
 
-@njit(cache=True)
+@helper
 def _reach(i, j, w, centres, radii, crossings):
     """How far the lens of two spheres reaches beyond a wall that both cross."""
     u = centres[j] - centres[i]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from porefv.mesh.facet_kernels import centroid
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
@@ -147,7 +147,7 @@ def _planes(mesh: PoreMesh) -> np.ndarray:
     return planes
 
 
-@njit(cache=True)
+@kernel
 def _locate(points, planes):
     """The cell outside of which each point lies least."""
     found = np.empty(points.shape[0], np.int64)

@@ -164,7 +164,7 @@ class PackingScene(Scene):
     )
     seed: Annotated[int, Whole(least=0)] = key(
         "whole number from which random places and the order of sizes follow. The same seed makes the same packing on "
-        "the same number of threads of one machine",
+        "the same kind of machine, with any number of threads",
         0,
     )
     grains: Annotated[Grains, MadeFrom(GrainsTable)] = key("the table `[grains]`: how many, of which sizes", {})
@@ -269,8 +269,7 @@ class PackingScene(Scene):
             height = (heights + packing.radii).max() - (heights - packing.radii).min()
             found["gravity"] = f"{vector(self.method.gravity)} m/s²"
             found["bed_height"] = f"{height:.6g} m"
-        # The seed makes the same packing only on as many threads.
-        return _described(packing, found | {"threads": str(dem.threads)}, self.seed)
+        return _described(packing, found, self.seed)
 
 
 def _state_text(state: PackingState) -> str:

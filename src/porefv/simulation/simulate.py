@@ -35,7 +35,6 @@ from porefv.simulation.run_record import (
 )
 from porefv.simulation.series import PROFILES, SERIES, Series, require_parquet, write_parquet
 from porefv.system.progress import Progress
-from porefv.system.threads import threads
 
 # Most steps at once, and between two looks at whether grains are at rest.
 _STRIDE = 100
@@ -90,8 +89,7 @@ def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, pr
         record.scene, record.path = scene.data, str(scene.path) if scene.path else None
         running = _Run(scene, record, dem, coupling, progress)
     try:
-        # As many threads as the grains have: more than there is work for cost more than they give.
-        with _interruptions(running), threads(dem.threads):
+        with _interruptions(running):
             running.go()
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted. {running.stop('interrupted')}") from None

@@ -13,17 +13,26 @@ and the random numbers are seeded: equal networks have equal factors, on any num
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from numba import get_num_threads
 
 from porefv.errors import ComputationError
 from porefv.solvers.elimination import Elimination, eliminated
 from porefv.solvers.network import Network
 from porefv.solvers.network_parts import links_of_separator, part_of_network, separator_numbers
-from porefv.solvers.substitution import FactorColumns, FactorRows, rows_from, substitute, substitute_parts
+from porefv.solvers.substitution import (
+    FactorColumns,
+    FactorRows,
+    backward,
+    forward,
+    rows_from,
+    substitute,
+    substitute_separator,
+    sum_separator_rows,
+)
+from porefv.system.threads import for_each, for_rows
 
 # Nodes from which two parts pay, and the size beyond which there are more of them.
 _CUT_FROM = 20_000
@@ -63,8 +72,7 @@ class ApproximateCholesky:
             part = part_of_network(network.rows, separator, local, bounds[k], bounds[k + 1])
             return _Piece(part.inner, part.outer, eliminated(part.rows, len(part.inner)))
 
-        with ThreadPoolExecutor(get_num_threads()) as pool:
-            pieces = list(pool.map(factor, range(n_parts)))
+        pieces = for_each(factor, range(n_parts))
         pieces.append(_separator_piece(network, separator, pieces))
 
         pivots = np.concatenate([piece.factor.pivots for piece in pieces])
@@ -88,9 +96,14 @@ class ApproximateCholesky:
 
     def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
         """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z. `y`, (n,), is room to work in."""
-        if len(self.parts) == 2 or get_num_threads() == 1:
-            return substitute(self.columns, r, z, y)
-        return substitute_parts(self.parts, self.columns, self.separator_rows, r, z, y)
+        columns, inner = self.columns, int(self.parts[-1])
+        if len(self.parts) == 2:
+            return substitute(columns, r, z, y)
+        parts = list(pairwise(self.parts.tolist()))
+        for_each(lambda part: forward(*part, columns, inner, r, y), parts)
+        for_rows(sum_separator_rows, len(y) - inner, columns, self.separator_rows, inner, r, y, least=4096)
+        product = substitute_separator(columns, inner, r, z, y)
+        return product + sum(for_each(lambda part: backward(*part, columns, r, z, y), parts))
 
 
 @dataclass(frozen=True, eq=False)

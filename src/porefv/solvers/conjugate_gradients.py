@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 
 from porefv.solvers.network import BLOCK, Network
-from porefv.system.kernels import njit, prange
-from porefv.system.threads import threads_for
+from porefv.system.kernels import kernel
+from porefv.system.threads import for_blocks, for_rows
 
 # By how much a correction makes the residual smaller before that is computed anew: the recurrence drifts by rounding.
 _REACH = 1e-10
@@ -27,6 +27,8 @@ MAX_ITERATIONS = 500
 # 10¹⁶ times as conductive as others, makes flows larger than all there are, which the next ones take away.
 _PATIENCE = 3
 _EPSILON = float(np.finfo(float).eps)
+# Nodes that take some 0.1 ms where each is one multiplication.
+_CHEAP = 1 << 16
 # Iterations between two looks at what the tolerance is measured against.
 _LOOK_EVERY = 4
 
@@ -91,9 +93,8 @@ def preconditioned_cg(
         Whether the rule is met. It is not after `limit` iterations, or where q·Aq or r·M⁻¹r is not positive: rounding
         has then spoilt the factor, or the numbers are not finite.
     """
-    # To start threads for a single block costs more than its numbers.
-    advance, redirect = (_advance_block, _redirect_block) if len(x) <= BLOCK else (_advance, _redirect)
-    q, aq, z, y = np.empty((4, len(x))) if room is None else room
+    n = len(x)
+    q, aq, z, y = np.empty((4, n)) if room is None else room
     rz = preconditioner.apply(r, z, y)
     q[:] = z
     iterations = 0
@@ -104,10 +105,10 @@ def preconditioned_cg(
         power = operator.multiply(q, aq)
         if not power > 0.0:
             return iterations, False
-        if rule.met_after(iterations, advance(x, r, q, aq, rz / power)):
+        if rule.met_after(iterations, sum(for_blocks(_advance, n, BLOCK, x, r, q, aq, rz / power))):
             return iterations, True
         before, rz = rz, preconditioner.apply(r, z, y)
-        redirect(q, z, rz / before)
+        for_rows(_redirect, n, q, z, rz / before, least=_CHEAP)
     return iterations, True
 
 
@@ -121,8 +122,8 @@ def imbalance(network: Network, rhs: np.ndarray, x: np.ndarray) -> tuple[float, 
 
 
 def _measures(network, rhs, x):
-    flow, size = _flow_and_size(network.leaks, network.diagonal, rhs, x)
-    return 0.5 * flow, _EPSILON * size
+    parts = for_blocks(_flow_and_size, len(network), BLOCK, network.leaks, network.diagonal, rhs, x)
+    return 0.5 * sum(flow for flow, _ in parts), _EPSILON * sum(size for _, size in parts)
 
 
 def conjugate_gradients(
@@ -149,29 +150,24 @@ def conjugate_gradients(
     -------
     x (n,), number of iterations
     """
-    with threads_for(len(network)):
-        return _iterate(network, rhs, preconditioner, tolerance, guess)
+    x = np.zeros(len(network)) if guess is None else guess.copy()
 
-
-def _iterate(a, rhs, preconditioner, tolerance, guess):
-    x = np.zeros(len(a)) if guess is None else guess.copy()
-
-    def enough():
-        flow, floor = _measures(a, rhs, x)
+    def enough() -> float:
+        flow, floor = _measures(network, rhs, x)
         return 0.5 * max(tolerance * flow, floor)
 
     iterations = 0
     before = np.inf
     while True:
         # (Re)start from the true residual: the recurrence drifts from it by rounding.
-        r = a.residual(rhs, x)
+        r = network.residual(rhs, x)
         lost = float(np.abs(r).sum())
-        flow, floor = _measures(a, rhs, x)
+        flow, floor = _measures(network, rhs, x)
         if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= MAX_ITERATIONS:
             return x, iterations
         before = lost
         rule = _ImbalanceRule(0.0, enough)
-        iterations += preconditioned_cg(a, preconditioner, x, r, rule, MAX_ITERATIONS - iterations)[0]
+        iterations += preconditioned_cg(network, preconditioner, x, r, rule, MAX_ITERATIONS - iterations)[0]
 
 
 class _ImbalanceRule:
@@ -242,20 +238,19 @@ def refined(
     Refined
         The pressures of the least imbalance, whether or not they meet both.
     """
-    with threads_for(len(network)):
-        found = best = _Approximation(_Equation(network, held, sources, preconditioner), *np.zeros((2, len(network))))
-        iterations = 0
-        futile = 0  # corrections, one after another, that have not halved the least imbalance
-        while not (found.conserves(tolerance) and found.error <= accuracy):
-            if futile >= _PATIENCE or iterations >= MAX_ITERATIONS:
-                break
-            to_tolerance = futile == 0 and not found.conserves(tolerance)
-            found, count = found.corrected(tolerance if to_tolerance else 0.0)
-            iterations += count
-            futile = 0 if found.lost < 0.5 * best.lost else futile + 1
-            if found.lost < best.lost:
-                best = found
-        return Refined(best.x, best.rest, iterations, best.lost, best.flow, best.error)
+    found = best = _Approximation(_Equation(network, held, sources, preconditioner), *np.zeros((2, len(network))))
+    iterations = 0
+    futile = 0  # corrections, one after another, that have not halved the least imbalance
+    while not (found.conserves(tolerance) and found.error <= accuracy):
+        if futile >= _PATIENCE or iterations >= MAX_ITERATIONS:
+            break
+        to_tolerance = futile == 0 and not found.conserves(tolerance)
+        found, count = found.corrected(tolerance if to_tolerance else 0.0)
+        iterations += count
+        futile = 0 if found.lost < 0.5 * best.lost else futile + 1
+        if found.lost < best.lost:
+            best = found
+    return Refined(best.x, best.rest, iterations, best.lost, best.flow, best.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,49 +330,31 @@ def _two_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return total, (a - (total - part)) + (b - part)
 
 
-@njit(cache=True, parallel=True)
-def _flow_and_size(leaks, diagonal, rhs, x):
-    """Σ|e x - b| and Σ d|x|."""
-    n = x.shape[0]
-    flow = np.zeros((n + BLOCK - 1) // BLOCK)
-    size = np.zeros(flow.shape[0])
-    for block in prange(flow.shape[0]):
-        for i in range(block * BLOCK, min(block * BLOCK + BLOCK, n)):
-            flow[block] += abs(leaks[i] * x[i] - rhs[i])
-            size[block] += diagonal[i] * abs(x[i])
-    return flow.sum(), size.sum()
-
-
-@njit(cache=True, parallel=True)
-def _advance(x, r, q, aq, alpha):
-    """x += α q, r -= α aq; returns Σ|r|."""
-    n = x.shape[0]
-    lost = np.zeros((n + BLOCK - 1) // BLOCK)
-    for block in prange(lost.shape[0]):
-        part = slice(block * BLOCK, min(block * BLOCK + BLOCK, n))
-        lost[block] = _advance_block(x[part], r[part], q[part], aq[part], alpha)
-    return lost.sum()
+@kernel
+def _flow_and_size(first, last, leaks, diagonal, rhs, x):
+    """Σ|e x - b| and Σ d|x| of nodes first ... last - 1."""
+    flow = 0.0
+    size = 0.0
+    for i in range(first, last):
+        flow += abs(leaks[i] * x[i] - rhs[i])
+        size += diagonal[i] * abs(x[i])
+    return flow, size
 
 
 # The sum may be taken in any order: it is then formed four numbers at a time.
-@njit(cache=True, nogil=True, fastmath={"reassoc"})
-def _advance_block(x, r, q, aq, alpha):
+@kernel(fastmath={"reassoc"})
+def _advance(first, last, x, r, q, aq, alpha):
+    """x += α q, r -= α aq for nodes first ... last - 1; returns their Σ|r|."""
     lost = 0.0
-    for i in range(x.shape[0]):
+    for i in range(first, last):
         x[i] += alpha * q[i]
         r[i] -= alpha * aq[i]
         lost += abs(r[i])
     return lost
 
 
-@njit(cache=True, parallel=True)
-def _redirect(q, z, beta):
-    """q = z + β q."""
-    for i in prange(q.shape[0]):
-        q[i] = z[i] + beta * q[i]
-
-
-@njit(cache=True, nogil=True)
-def _redirect_block(q, z, beta):
-    for i in range(q.shape[0]):
+@kernel
+def _redirect(first, last, q, z, beta):
+    """q = z + β q for nodes first ... last - 1."""
+    for i in range(first, last):
         q[i] = z[i] + beta * q[i]

@@ -13,7 +13,7 @@ import numpy as np
 
 from porefv.solvers.network import NetworkRows
 from porefv.system.growing_arrays import doubled
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 from porefv.system.random_numbers import random_state, uniform
 
 # What leaks lead to, among the neighbours of a node.
@@ -114,7 +114,7 @@ def eliminated(network: NetworkRows, n: int) -> Elimination:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _eliminate(network, n, records, rows, factors, random):
     """Eliminate the first n nodes, the least connected first, in sweeps along the numbering.
 
@@ -178,7 +178,7 @@ def _eliminate(network, n, records, rows, factors, random):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _in_lists(network, n, records):
     """The links of the first n nodes in lists."""
     starts, columns, links, _ = network
@@ -196,7 +196,7 @@ def _in_lists(network, n, records):
     return HalfLinks(records, heads, degrees, np.array([used, -1, 0]))
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _star(limit):
     """Room for the neighbours of a node of so many half-links, and the ground."""
     return Star(np.empty(limit + 1, np.int32), np.empty(limit + 1), np.empty(limit + 1))
@@ -205,7 +205,7 @@ def _star(limit):
 # The steps for one node are inlined: numba would count references to all the arrays at every call, which takes longer.
 
 
-@njit(cache=True, nogil=True, inline="always")
+@helper(inline="always")
 def _take_list(i, half_links, gone, slots, star):
     """Gather the neighbours of node i that are left, parallel links added up, and free its list; returns their number.
 
@@ -237,7 +237,7 @@ def _take_list(i, half_links, gone, slots, star):
     return m
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@helper(error_model="numpy", inline="always")
 def _sample_fill(star, m, pivot, half_links, leaks, kept, random):
     """Link each of m neighbours, the weakest first, to one of those with larger weights.
 
@@ -259,7 +259,7 @@ def _sample_fill(star, m, pivot, half_links, leaks, kept, random):
         _add_link(nodes[q], nodes[p], weights[q] * beyond[q] / pivot, half_links, leaks, kept)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@helper(inline="always")
 def _sort_by_weight(star, m):
     """Sort the m neighbours of a star, the smallest weight first, by insertion."""
     nodes, weights, _ = star
@@ -275,7 +275,7 @@ def _sort_by_weight(star, m):
         nodes[p] = node
 
 
-@njit(cache=True, nogil=True, inline="always")
+@helper(inline="always")
 def _add_link(a, b, weight, half_links, leaks, kept):
     """Add a link between two nodes, or a node and the ground."""
     n = half_links.heads.shape[0]
@@ -296,7 +296,7 @@ def _add_link(a, b, weight, half_links, leaks, kept):
             _add_half_link(b, a, weight, half_links)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@helper(inline="always")
 def _add_half_link(i, other, weight, half_links):
     """Put a half-link to another node at the head of the list of node i."""
     records, heads, degrees, counts = half_links
@@ -314,7 +314,7 @@ def _add_half_link(i, other, weight, half_links):
     degrees[i] += 1
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _with_room(half_links, more):
     """The half-links with room for so many more."""
     records, heads, degrees, counts = half_links
@@ -323,7 +323,7 @@ def _with_room(half_links, more):
     return HalfLinks(doubled(records), heads, degrees, counts)
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _with_room_to_keep(kept, more):
     """The kept links with room for so many more."""
     pairs, weights, number = kept

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import kernel
+from porefv.system.threads import for_blocks, for_rows
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -102,12 +103,12 @@ class Network:
 
     def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
         """aq = A q, from differences of q; returns q·aq."""
-        return _multiply(self.rows, q, aq)
+        return sum(for_blocks(_multiply, len(self), BLOCK, self.rows, q, aq))
 
     def residual(self, rhs: np.ndarray, x: np.ndarray) -> np.ndarray:
         """b - A x, from differences of x: the imbalance of each node."""
         out = np.empty(len(self))
-        residual(self.rows, rhs, x, out)
+        for_rows(_residual, len(self), self.rows, rhs, x, out, least=BLOCK)
         return out
 
     def split_residual(self, held: np.ndarray, sources: np.ndarray, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -128,7 +129,7 @@ class Network:
             Imbalance of each node [m³/s].
         """
         out = np.empty(len(self))
-        split_residual(self.rows, held, sources, x, rest, out)
+        for_rows(_split_residual, len(self), self.rows, held, sources, x, rest, out, least=BLOCK)
         return out
 
     def to_matrix(self) -> sparse.csr_array:
@@ -141,7 +142,7 @@ class Network:
         return (off + sparse.diags_array(self.diagonal)).tocsr()
 
 
-@njit(cache=True)
+@kernel
 def _count(pairs, weights, number, starts):
     """Add the number of node i's links to starts[i + 1]."""
     for t in range(pairs.shape[0]):
@@ -152,7 +153,7 @@ def _count(pairs, weights, number, starts):
             starts[b + 1] += 1
 
 
-@njit(cache=True)
+@kernel
 def _fill(pairs, weights, number, place, columns, links, diagonal):
     """Store every link in both its rows, from `place` on, and add it to the diagonal."""
     for t in range(pairs.shape[0]):
@@ -170,58 +171,36 @@ def _fill(pairs, weights, number, place, columns, links, diagonal):
         place[b] += 1
 
 
-@njit(cache=True, parallel=True)
-def _multiply(network, q, aq):
-    """aq = A q; returns q·aq."""
+@kernel
+def _multiply(first, last, network, q, aq):
+    """Rows first ... last - 1 of aq = A q; returns their part of q·aq."""
     starts, columns, links, leaks = network
-    n = q.shape[0]
-    parts = np.zeros((n + BLOCK - 1) // BLOCK)
-    for block in prange(parts.shape[0]):
-        total = 0.0
-        for i in range(block * BLOCK, min(block * BLOCK + BLOCK, n)):
-            s = leaks[i] * q[i]
-            for k in range(starts[i], starts[i + 1]):
-                s += links[k] * (q[i] - q[columns[k]])
-            aq[i] = s
-            total += s * q[i]
-        parts[block] = total
-    return parts.sum()
+    total = 0.0
+    for i in range(first, last):
+        s = leaks[i] * q[i]
+        for k in range(starts[i], starts[i + 1]):
+            s += links[k] * (q[i] - q[columns[k]])
+        aq[i] = s
+        total += s * q[i]
+    return total
 
 
-@njit(cache=True, parallel=True)
-def residual(network, rhs, x, out):
-    """out = b - A x.
-
-    Parameters
-    ----------
-    network : NetworkRows
-    rhs, x : (n,) float64 arrays
-        b [m³/s], and the pressure of each node [Pa].
-    out : (n,) float64 array
-        To fill [m³/s].
-    """
+@kernel
+def _residual(first, last, network, rhs, x, out):
+    """Rows first ... last - 1 of out = b - A x."""
     starts, columns, links, leaks = network
-    for i in prange(leaks.shape[0]):
+    for i in range(first, last):
         s = rhs[i] - leaks[i] * x[i]
         for k in range(starts[i], starts[i + 1]):
             s -= links[k] * (x[i] - x[columns[k]])
         out[i] = s
 
 
-@njit(cache=True, parallel=True)
-def split_residual(network, held, sources, x, rest, out):
-    """out = leaks held + sources - A (x + rest).
-
-    Parameters
-    ----------
-    network : NetworkRows
-    held, sources, x, rest : (n,) float64 arrays
-        As for `Network.split_residual`.
-    out : (n,) float64 array
-        To fill [m³/s].
-    """
+@kernel
+def _split_residual(first, last, network, held, sources, x, rest, out):
+    """Rows first ... last - 1 of out = leaks held + sources - A (x + rest)."""
     starts, columns, links, leaks = network
-    for i in prange(leaks.shape[0]):
+    for i in range(first, last):
         s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
         for k in range(starts[i], starts[i + 1]):
             j = columns[k]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.solvers.network import NetworkRows
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 
 
 class NetworkPart(NamedTuple):
@@ -27,7 +27,7 @@ class NetworkPart(NamedTuple):
     rows: NetworkRows
 
 
-@njit(cache=True)
+@kernel
 def separator_numbers(network, bounds):
     """(n,): number of each node in the separator, -1 outside; part p has the nodes bounds[p] ... bounds[p + 1] - 1."""
     starts, columns = network.starts, network.columns
@@ -43,7 +43,7 @@ def separator_numbers(network, bounds):
     return number
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def part_of_network(network, separator, local, first, last):
     """The part of the nodes first ... last - 1; `local` (n,) is given, for the numbers of the inner nodes in it.
 
@@ -97,7 +97,7 @@ def part_of_network(network, separator, local, first, last):
     return NetworkPart(inner[:n_inner].copy(), outer[:n_outer].copy(), rows)
 
 
-@njit(cache=True)
+@kernel
 def links_of_separator(network, separator, nodes):
     """Links (m, 2), (m,) between the nodes of the separator, in its numbering."""
     starts, columns, links, _ = network

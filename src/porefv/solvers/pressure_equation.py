@@ -10,7 +10,7 @@ import numpy as np
 from porefv.errors import ComputationError
 from porefv.solvers.network import Network
 from porefv.solvers.solver import TOLERANCE, SolverReport, solve_split
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 from porefv.system.union_find import join
 
 
@@ -95,7 +95,7 @@ def solve_network(
     return NetworkSolution(pressure, isolated, report, rest)
 
 
-@njit(cache=True)
+@kernel
 def reached(pairs, weights, sources):
     """(n,) bool: nodes that links of positive weight join to a source."""
     n = sources.shape[0]
@@ -155,7 +155,7 @@ def free_network(
     return Network.from_links(pairs, conductances, leaks, number), rhs
 
 
-@njit(cache=True)
+@kernel
 def _leak(pairs, conductances, pressure, number, leaks, rhs):
     """Add links from free to held pores to `leaks` and `rhs`."""
     for t in range(pairs.shape[0]):

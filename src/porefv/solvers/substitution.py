@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel
 
 
 class FactorColumns(NamedTuple):
@@ -42,7 +42,7 @@ class FactorRows(NamedTuple):
     factors: np.ndarray
 
 
-@njit(cache=True)
+@kernel
 def rows_from(factor, n_inner):
     """The entries of the first n_inner columns in the rows from n_inner on."""
     starts, rows, factors = factor.starts, factor.rows, factor.factors
@@ -66,7 +66,7 @@ def rows_from(factor, n_inner):
     return FactorRows(row_starts, columns, row_factors)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def substitute(factor, r, z, y):
     """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z.
 
@@ -87,52 +87,25 @@ def substitute(factor, r, z, y):
         v = y[k]
         for e in range(starts[k], starts[k + 1]):
             y[rows[e]] += factors[e] * v
-    return _backward(factor, 0, n, r, z, y)
+    return _backward(0, n, factor, r, z, y)
 
 
-@njit(cache=True, parallel=True)
-def substitute_parts(parts, factor, separator_rows, r, z, y):
-    """The same, parts side by side.
+@kernel
+def forward(first, last, factor, n_inner, r, y):
+    """y = L⁻¹ r within one part.
 
     Parameters
     ----------
-    parts : (p + 1,) int array
-        Where each part begins in the order of the factor, and where the last ends.
-    factor : named tuple of arrays
-        Order of the nodes, and the columns of L and D.
-    separator_rows : named tuple of arrays
-        Rows of L of the separator's nodes.
+    first, last : int
+        The part has the positions first ... last - 1.
+    factor : FactorColumns
+    n_inner : int
+        Position where the separator starts; its nodes wait for all the parts.
     r : (n,) float64 array
         Right-hand side.
-    z, y : (n,) float64 arrays
-        To fill: the result, and what lies between the two substitutions.
+    y : (n,) float64 array
+        To fill.
     """
-    order, starts, rows, factors, _ = factor
-    row_starts, row_columns, row_factors = separator_rows
-    n = order.shape[0]
-    n_parts = parts.shape[0] - 1
-    n_inner = parts[n_parts]
-    products = np.zeros(n_parts + 1)
-    for part in prange(n_parts):
-        _forward(factor, parts[part], parts[part + 1], n_inner, r, y)
-    for i in prange(n - n_inner):
-        s = r[order[n_inner + i]]
-        for e in range(row_starts[i], row_starts[i + 1]):
-            s += row_factors[e] * y[row_columns[e]]
-        y[n_inner + i] = s
-    for k in range(n_inner, n):
-        v = y[k]
-        for e in range(starts[k], starts[k + 1]):
-            y[rows[e]] += factors[e] * v
-    products[n_parts] = _backward(factor, n_inner, n, r, z, y)
-    for part in prange(n_parts):
-        products[part] = _backward(factor, parts[part], parts[part + 1], r, z, y)
-    return products.sum()
-
-
-@njit(cache=True)
-def _forward(factor, first, last, n_inner, r, y):
-    """y = L⁻¹ r within one part."""
     order, starts, rows, factors, _ = factor
     for k in range(first, last):
         y[k] = r[order[k]]
@@ -143,9 +116,52 @@ def _forward(factor, first, last, n_inner, r, y):
                 y[rows[e]] += factors[e] * v
 
 
-@njit(cache=True, error_model="numpy")
-def _backward(factor, first, last, r, z, y):
-    """y and z = L⁻ᵀ D⁻¹ y for one part; returns its part of r·z."""
+@kernel
+def sum_separator_rows(first, last, factor, separator_rows, n_inner, r, y):
+    """What the separator's nodes first ... last - 1 get from the parts, into y.
+
+    Parameters
+    ----------
+    first, last : int
+        Nodes to treat, counted from the start of the separator.
+    factor : FactorColumns
+    separator_rows : FactorRows
+    n_inner : int
+        Position where the separator starts.
+    r : (n,) float64 array
+        Right-hand side.
+    y : (n,) float64 array
+        Filled for the parts; to fill for the separator.
+    """
+    row_starts, row_columns, row_factors = separator_rows
+    for i in range(first, last):
+        s = r[factor.order[n_inner + i]]
+        for e in range(row_starts[i], row_starts[i + 1]):
+            s += row_factors[e] * y[row_columns[e]]
+        y[n_inner + i] = s
+
+
+@kernel(error_model="numpy")
+def substitute_separator(factor, n_inner, r, z, y):
+    """Both substitutions within the separator, from position n_inner on; returns its part of r·z."""
+    _, starts, rows, factors, _ = factor
+    n = y.shape[0]
+    for k in range(n_inner, n):
+        v = y[k]
+        for e in range(starts[k], starts[k + 1]):
+            y[rows[e]] += factors[e] * v
+    return _backward(n_inner, n, factor, r, z, y)
+
+
+@kernel(error_model="numpy")
+def backward(first, last, factor, r, z, y):
+    """y and z = L⁻ᵀ D⁻¹ y within one part, positions first ... last - 1; returns its part of r·z."""
+    return _backward(first, last, factor, r, z, y)
+
+
+@helper(error_model="numpy")
+def _backward(first, last, factor, r, z, y):
+    """y and z = L⁻ᵀ D⁻¹ y for positions first ... last - 1; returns their part of r·z."""
     order, starts, rows, factors, inverse_pivots = factor
     product = 0.0
     for k in range(last - 1, first - 1, -1):

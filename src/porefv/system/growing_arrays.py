@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper
 
 
-@njit(cache=True)
+@helper
 def doubled(array: np.ndarray) -> np.ndarray:
     """The array at the start of one twice as long."""
     larger = np.empty(2 * array.shape[0], array.dtype)

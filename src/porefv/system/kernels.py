@@ -1,64 +1,74 @@
-"""numba's `njit` and `prange`, for kernels that are kept on disk where they can be, and compiled anew where not.
+"""Decorators of the functions that numba compiles: kernels, which Python calls, and their helpers.
 
-numba alone gives up where no directory can be written to, or where the disk is full: a kernel that is compiled
-already need not fail because it cannot be kept. Only the cache of a kernel of this package is another one than
-numba's own; nothing of numba itself is changed.
+A kernel is kept on disk once it is compiled, and many are compiled already when the package is built
+(`porefv.system.kernel_files`). It releases Python's lock while it runs, so that threads run kernels side by side
+(`porefv.system.threads`). Arrays and named tuples of arrays come in; results are filled into arrays that come in,
+or are numbers.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numba
-from numba import prange
-from numba.core import caching
+import numpy as np
 
-from porefv.errors import CompilationWarning
+from porefv.system.kernel_files import KernelFiles
 
-__all__ = ["njit", "prange"]
+__all__ = ["all_kernels", "helper", "kernel", "unsigned_range"]
 
-
-def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit` with the same options; with `cache` compiled kernels are kept on disk as long as there is room."""
-
-    def decorate(function: Callable[..., Any]) -> Any:
-        kernel = numba.njit(**options)(function)
-        if cache and kernel is not function:  # as it is where compiling is disabled
-            kernel._cache = _cache_of(function)  # what numba's own option sets, to its own kind of cache
-        return kernel
-
-    return decorate
+_kernels: dict[str, Any] = {}
 
 
-class _Cache(caching.FunctionCache):
-    """On disk, as long as there is room."""
+def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """`numba.njit` for a function that Python calls, kept on disk. `options` are numba's, as of `helper`.
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            self.disable()
-            _warn(error.strerror or type(error).__name__)
+    Examples
+    --------
+    >>> import numpy as np
+    >>> @kernel(error_model="numpy")
+    ... def invert(first, last, values, inverses):
+    ...     for i in range(first, last):
+    ...         inverses[i] = 1.0 / values[i]
+    >>> found = np.empty(2)
+    >>> invert(0, 2, np.array([2.0, 0.5]), found)
+    >>> found
+    array([0.5, 2. ])
+    """
+    if function is None:
+        return lambda function: kernel(function, **options)
+    # Nobody calls it by way of ctypes: one wrapper less to compile.
+    compiled = numba.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+    if compiled is not function:  # as it is where compiling is disabled
+        compiled._cache = KernelFiles(compiled)  # what numba's own option `cache` sets, to its own kind of cache
+        _kernels[f"{function.__module__}.{function.__qualname__}"] = compiled
+    return compiled
 
 
-def _cache_of(function: Callable[..., Any]) -> caching._Cache:
-    """The cache of a function that numba is to compile."""
-    try:
-        return _Cache(function)
-    except RuntimeError:
-        _warn("no directory for them can be written to")
-        return caching.NullCache()
+def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """`numba.njit` for a function that kernels call: it is part of their machine code, and not kept by itself.
+
+    Parameters
+    ----------
+    function : callable
+    **options
+        Of numba: `error_model`, `fastmath`, `inline`.
+    """
+    if function is None:
+        return lambda function: helper(function, **options)
+    return numba.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 
-@cache
-def _warn(reason: str) -> None:
-    """Once in a process: numba makes Python forget which warnings it has shown."""
-    warnings.warn(
-        f"compiled kernels cannot be kept ({reason}): every process compiles anew, for a minute. "
-        "Name a directory with room in the variable NUMBA_CACHE_DIR",
-        CompilationWarning,
-        stacklevel=1,
-    )
+@helper
+def unsigned_range(first, last):
+    """range(first, last), of numbers without sign: an array needs no look at whether they count from its end.
+
+    Arithmetic with such a number and one with sign gives a float.
+    """
+    return range(np.uint64(first), np.uint64(last))
+
+
+def all_kernels() -> dict[str, Any]:
+    """The kernels of all modules imported so far, by module and name."""
+    return dict(_kernels)

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from porefv.errors import ComputationError
+from porefv.system.control_groups import control_groups
 
 LOADED = 200 * 2**20  # B: Python, numpy, scipy, numba and the kernels
 
@@ -45,34 +46,16 @@ def _machine(root: Path) -> Iterator[int]:
 
 
 def _control_groups(root: Path) -> Iterator[int]:
-    """What each group that holds the process has left, the process's own first, version 2 or 1."""
-    try:
-        lines = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError):
-        return
-    for line in lines:
-        if line.count(":") < 2:
-            continue
-        _, controllers, path = line.split(":", 2)
-        mount = root / "sys/fs/cgroup"
+    """What each group that holds the process has left."""
+    for group in control_groups(root, "memory"):
         limit, usage, idle = "memory.max", "memory.current", "inactive_file"
-        if controllers:
-            if "memory" not in controllers.split(","):
-                continue
-            mount /= "memory"
+        if group.version == 1:
             limit, usage, idle = "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"
-        # Within a container the path may be the host's, and only the mount itself be there.
-        group = mount / path.lstrip("/")
-        for folder in (group, *group.parents):
-            try:
-                # "max" is no number: no limit.
-                left = int((folder / limit).read_text()) - int((folder / usage).read_text())
-                stat = dict(entry.split() for entry in (folder / "memory.stat").read_text().splitlines())
-                yield max(0, left + int(stat.get(idle, 0)))  # pages of files, dropped when room is short
-            except (OSError, ValueError):
-                pass
-            if folder == mount:
-                break
+        with suppress(OSError, ValueError):
+            # "max" is no number: no limit.
+            left = int((group.folder / limit).read_text()) - int((group.folder / usage).read_text())
+            stat = dict(entry.split() for entry in (group.folder / "memory.stat").read_text().splitlines())
+            yield max(0, left + int(stat.get(idle, 0)))  # pages of files, dropped when room is short
 
 
 def _process(root: Path) -> Iterator[int]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper
 
 _WORDS, _SHIFT = 624, 397
 _UPPER, _LOWER, _TWIST = 0x80000000, 0x7FFFFFFF, 0x9908B0DF
@@ -20,13 +20,13 @@ def random_state(seed: int) -> np.ndarray:
     return np.append(words, _WORDS).astype(np.int64)
 
 
-@njit(cache=True, nogil=True)
+@helper
 def uniform(state):
     """The next random number, 0 <= x < 1; `state` (625,) moves on."""
     return ((_word(state) >> 5) * 67108864.0 + (_word(state) >> 6)) / 9007199254740992.0  # (2²⁶ a + b) / 2⁵³
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _word(state):
     """The next word of 32 bits."""
     if state[_WORDS] == _WORDS:
@@ -39,7 +39,7 @@ def _word(state):
     return y ^ (y >> 18)
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _renew(state):
     """Replace all words by the next ones."""
     for i in range(_WORDS):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper
 
 
-@njit(cache=True)
+@helper
 def join(parent: np.ndarray, i: int, j: int) -> None:
     """Put i and j in one set, under the smaller of their roots; the paths passed are halved."""
     while parent[i] != i:

@@ -9,14 +9,14 @@ its first sphere, and cells of different blocks are joined where they have a fac
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import get_num_threads
 
 from porefv.packing.memory_estimate import ensure_room_for_cells
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
+from porefv.system.threads import for_each, for_rows, thread_count
 from porefv.tessellation import insertion
 from porefv.tessellation.insertion import Cells, Scale, Workspace
 from porefv.tessellation.ordering import rounds
@@ -61,20 +61,17 @@ def triangulate(vertices: Vertices, extent: np.ndarray) -> FoundCells:
         Size of the box.
     """
     n, points, radii = vertices
-    n_blocks = max(1, min(get_num_threads(), n // LEAST_BLOCK))
+    n_blocks = max(1, min(thread_count(), n // LEAST_BLOCK))
     if n_blocks == 1:
-        return _compact(_build(vertices, extent), n, np.ones(n, np.bool_))
+        return _compact(_build(vertices, extent), np.ones(n, np.bool_), vertices, extent, sort=n >= 2 * LEAST_BLOCK)
 
     axis = int(np.argmax(extent))
     x = points[:n, axis]
     cuts = np.partition(x, [n * k // n_blocks for k in range(1, n_blocks)])
     edges = [-np.inf, *(cuts[n * k // n_blocks] for k in range(1, n_blocks)), np.inf]
     reach = 1.5 * float(np.prod(extent) / n) ** (1.0 / 3.0) + 1.5 * float(radii[:n].max())
-    with ThreadPoolExecutor(n_blocks) as pool:
-        blocks = list(
-            pool.map(lambda k: _block(Slab(axis, edges[k], edges[k + 1]), reach, vertices, extent), range(n_blocks))
-        )
-    return _join(blocks)
+    slabs = [Slab(axis, low, high) for low, high in pairwise(edges)]
+    return _join(for_each(lambda slab: _block(slab, reach, vertices, extent), slabs))
 
 
 def _build(vertices: Vertices, extent: np.ndarray) -> FoundCells:
@@ -128,7 +125,7 @@ def _block(slab: Slab, reach: float, vertices: Vertices, extent: np.ndarray) -> 
         within = Vertices(len(spheres), points[names], radii[names])
         cells = _build(within, extent)
         if len(spheres) == n or cells_are_certain(cells, own, within, largest, Slab(axis, low - reach, high + reach)):
-            cells = _compact(cells, len(spheres), own)
+            cells = _compact(cells, own, within, extent, sort=True)
             return FoundCells(names[cells.vertices], cells.neighbours, cells.planes)
         reach *= 2.0
 
@@ -153,10 +150,14 @@ def _join(blocks: list[FoundCells]) -> FoundCells:
     assert np.array_equal(facets[a], facets[b])
     neighbours[cell[a], place[a]] = cell[b]
     neighbours[cell[b], place[b]] = cell[a]
-    return FoundCells(cells, neighbours, planes)
+    # In the order of their first spheres, as in one piece.
+    order = np.argsort(cells[:, 0], kind="stable")
+    number = np.empty(len(order) + 1, np.int32)
+    number[order], number[-1] = np.arange(len(order)), -1
+    return FoundCells(cells[order], number[neighbours[order]], planes[order])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cells_are_certain(found, own, vertices, largest, slab):
     """Whether every cell at a block's own spheres keeps clear of all spheres outside a slab.
 
@@ -197,41 +198,130 @@ def cells_are_certain(found, own, vertices, largest, slab):
     return True
 
 
-@njit(cache=True, nogil=True)
-def _compact(found, n, own):
-    """The cells whose first sphere is one of a block's own, numbered along the numbering of their first spheres."""
-    cells, neighbours, planes = found
-    m = cells.shape[0]
-    start = np.zeros(n + 1, np.int64)
-    key = np.full(m, -1, np.int64)
-    for t in range(m):
+def _compact(found: FoundCells, own: np.ndarray, vertices: Vertices, extent: np.ndarray, sort: bool) -> FoundCells:
+    """The cells whose first sphere is one of a block's own, numbered along the numbering of their first spheres.
+
+    With `sort` their order does not depend on how they were found: cells of the same first sphere are sorted by their
+    vertices, and so are the vertices of each cell, but for the last two where its orientation asks for it. Power
+    centres are worked out anew from that order: their rounding depends on it.
+    """
+    m = len(found.vertices)
+    ends, firsts = np.zeros(vertices.n_spheres + 1, np.int64), np.empty(m, np.int32)
+    count = _count_own(found.vertices, own, ends, firsts)
+    cells = Cells(np.empty((count, 4), np.int32), np.empty((count, 4), np.int32), np.empty((count, 4)), np.empty(count))
+    _group_cells(found, ends, firsts, np.full(m, _FOREIGN, np.int32), cells, sort)
+    if sort:
+        for_rows(insertion.place_again, count, vertices, cells, Scale(extent, 0.0))
+    return FoundCells(*cells[:3])
+
+
+@kernel
+def _count_own(cells, own, ends, firsts):
+    """How many cells have their first sphere, the least, among `own`.
+
+    Parameters
+    ----------
+    cells : (m, 4) int32 array
+    own : (n,) bool array
+    ends : (n + 1,) int64 array
+        Zero; to be filled with the number of cells whose first sphere is below each sphere.
+    firsts : (m,) int32 array
+        To be filled with the first sphere of each cell, -1 for others.
+    """
+    n = own.shape[0]
+    for t in range(cells.shape[0]):
+        firsts[t] = -1
         if cells[t, 0] < 0:
             continue
-        least = n
-        for i in range(4):
-            if cells[t, i] < least:
-                least = cells[t, i]
+        least = min(min(cells[t, 0], cells[t, 1]), min(cells[t, 2], cells[t, 3]))
         if own[least]:
-            key[t] = least
-            start[least + 1] += 1
+            firsts[t] = least
+            ends[least + 1] += 1
     for k in range(n):
-        start[k + 1] += start[k]
-    count = start[n]
-    number = np.full(m, _FOREIGN, np.int32)
-    for t in range(m):
-        if key[t] >= 0:
-            number[t] = start[key[t]]
-            start[key[t]] += 1
-    new_cells = np.empty((count, 4), np.int32)
-    new_neighbours = np.empty((count, 4), np.int32)
-    new_planes = np.empty((count, 4))
-    for t in range(m):
-        c = number[t]
-        if c < 0:
+        ends[k + 1] += ends[k]
+    return ends[n]
+
+
+@kernel
+def _group_cells(found, starts, firsts, number, grouped, sort):
+    """Fill `grouped` with cells in groups that have the same first sphere.
+
+    Parameters
+    ----------
+    found : FoundCells
+    starts, firsts : (n + 1,), (m,) arrays
+        As `_count_own` leaves them; the starts are moved.
+    number : (m,) int32 array
+        To be filled with the place of each cell; what is there before stays for others.
+    grouped : Cells
+    sort : bool
+        See `_compact`.
+    """
+    vertices, neighbours, planes = found
+    order = np.empty((grouped.vertices.shape[0], 4), np.int8)
+    members = np.empty(order.shape[0], np.int32)
+    for t in range(vertices.shape[0]):
+        k = firsts[t]
+        if k < 0:
             continue
+        place = starts[k]
+        starts[k] += 1
+        members[place] = t
         for i in range(4):
-            u = neighbours[t, i]
-            new_cells[c, i] = cells[t, i]
-            new_neighbours[c, i] = number[u] if u >= 0 else -1
-            new_planes[c, i] = planes[t, i]
-    return FoundCells(new_cells, new_neighbours, new_planes)
+            order[place, i] = i
+        if sort:
+            _sort_four(vertices[t], order[place])
+    if sort:  # within each group; `starts` now holds their ends
+        first = 0
+        for k in range(starts.shape[0] - 1):
+            for i in range(first + 1, starts[k]):
+                t = members[i]
+                o0, o1, o2, o3 = order[i]
+                j = i
+                while j > first and _before(vertices, t, (o1, o2, o3), members[j - 1], order[j - 1]):
+                    members[j] = members[j - 1]
+                    order[j] = order[j - 1]
+                    j -= 1
+                members[j] = t
+                order[j, 0], order[j, 1], order[j, 2], order[j, 3] = o0, o1, o2, o3
+            first = starts[k]
+    for place in range(members.shape[0]):
+        number[members[place]] = place
+    for place in range(members.shape[0]):
+        t = members[place]
+        o0, o1, o2, o3 = order[place]
+        if _is_odd(o0, o1, o2, o3):
+            order[place, 2], order[place, 3] = o3, o2
+        for i in range(4):
+            u = neighbours[t, order[place, i]]
+            grouped.vertices[place, i] = vertices[t, order[place, i]]
+            grouped.neighbours[place, i] = number[u] if u >= 0 else -1
+            grouped.planes[place, i] = planes[t, i]
+
+
+@helper
+def _sort_four(values, order):
+    """Fill in the places of four values in rising order."""
+    for i in range(4):
+        j = i
+        while j > 0 and values[order[j - 1]] > values[i]:
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = i
+
+
+@helper
+def _before(vertices, t, places, u, others):
+    """Whether the last three vertices of cell t come before those of cell u."""
+    for i in range(3):
+        a = vertices[t, places[i]]
+        b = vertices[u, others[i + 1]]
+        if a != b:
+            return a < b
+    return False
+
+
+@helper
+def _is_odd(a, b, c, d):
+    """Whether an odd number of swaps sorts the four places."""
+    return ((a > b) + (a > c) + (a > d) + (b > c) + (b > d) + (c > d)) % 2 == 1

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.system.growing_arrays import doubled
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, minors, power_centre, row, side
 
 # Relative error of a power centre beyond which it is computed again in exact arithmetic.
@@ -78,7 +78,7 @@ def cells_used(work: Workspace) -> int:
     return int(work.counts[_UNUSED])
 
 
-@njit(cache=True)
+@kernel
 def start(q, vertices, triangulation, work, scale):
     """The first sphere: eight cells, each of the sphere and the three walls at one corner of the box.
 
@@ -112,7 +112,7 @@ def start(q, vertices, triangulation, work, scale):
     work.counts[_INSERTED] = 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def insert(order, first, vertices, triangulation, work, scale):
     """Insert the spheres order[first:] into `Cells`; returns how many were done (fewer where the arrays are full).
 
@@ -258,7 +258,7 @@ def insert(order, first, vertices, triangulation, work, scale):
 # The steps for one cell are inlined: numba would count references to all the arrays at every call.
 
 
-@njit(cache=True, inline="always")
+@helper(inline="always")
 def _find_conflict(t, q, hq, vertices, triangulation):
     """A cell in conflict with q, or -1 if q is hidden.
 
@@ -297,7 +297,7 @@ def _find_conflict(t, q, hq, vertices, triangulation):
     return t if in_conflict(cells[t], q, vertices) else -1
 
 
-@njit(cache=True, inline="always")
+@helper(inline="always")
 def _place(t, q, vertices, triangulation, scale):
     """Power centre of cell t, relative to its sphere q, with a bound on the error of f."""
     _, points, weights = vertices
@@ -339,7 +339,23 @@ def _place(t, q, vertices, triangulation, scale):
     bounds[t] = 2.0 * error + 32.0 * EPSILON * scale.magnitude
 
 
-@njit(cache=True)
+@kernel
+def place_again(first, last, vertices, triangulation, scale):
+    """Power centres of cells first ... last - 1, each relative to its first vertex, a sphere.
+
+    Parameters
+    ----------
+    first, last : int
+        Cells to treat: first ... last - 1.
+    vertices : Vertices
+    triangulation : Cells
+    scale : Scale
+    """
+    for t in range(first, last):
+        _place(t, triangulation.vertices[t, 0], vertices, triangulation, scale)
+
+
+@helper
 def _numerators(rows, heights, magnitudes):
     """The vector Σ H (a × b) of three rows, and its permanents, with terms of magnitude T for H."""
     a, b, c = rows

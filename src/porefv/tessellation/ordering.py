@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper, kernel
 
 _BITS = 20
 
@@ -21,7 +21,7 @@ def morton_codes(points: np.ndarray) -> np.ndarray:
     return _interleave(points, lower, ((1 << _BITS) - 1) / size if size > 0.0 else 0.0)
 
 
-@njit(cache=True)
+@kernel
 def _interleave(points, lower, inverse):
     codes = np.empty(points.shape[0], np.int64)
     for k in range(points.shape[0]):
@@ -32,7 +32,7 @@ def _interleave(points, lower, inverse):
     return codes
 
 
-@njit(cache=True)
+@helper
 def _spread(x):
     x = (x | (x << 32)) & 0x1F00000000FFFF
     x = (x | (x << 16)) & 0x1F0000FF0000FF

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import njit
+from porefv.system.kernels import helper
 from porefv.tessellation.expansions import add, estimate, multiply, sign, two_product, two_sum
 
 EPSILON = 2.0**-53
@@ -27,7 +27,7 @@ _MINOR_BOUND = 8.0 * EPSILON
 _CONFLICT_BOUND = 24.0 * EPSILON
 
 
-@njit(cache=True)
+@helper
 def minors(b, c):
     """The vector b × c of two rows, and its permanents of absolute values (the scale of its rounding error)."""
     return (
@@ -40,14 +40,14 @@ def minors(b, c):
     )
 
 
-@njit(cache=True)
+@helper
 def determinant(a, b, c):
     """det of three rows and its permanent of absolute values (the scale of its rounding error)."""
     m, p = minors(b, c)
     return a[0] * m[0] + a[1] * m[1] + a[2] * m[2], abs(a[0]) * p[0] + abs(a[1]) * p[1] + abs(a[2]) * p[2]
 
 
-@njit(cache=True)
+@helper
 def row(v, q, vertices):
     """a_k, H_k and the magnitude of the terms of H_k, in floating point."""
     n, points, weights = vertices
@@ -66,7 +66,7 @@ def row(v, q, vertices):
     return (x, y, z), 2.0 * (weights[v] - along), 2.0 * (abs(weights[v]) + abs(along))
 
 
-@njit(cache=True)
+@helper
 def side(cell, i, q, vertices):
     """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i.
 
@@ -94,7 +94,7 @@ def side(cell, i, q, vertices):
     return -s if i % 2 == 0 else s
 
 
-@njit(cache=True)
+@helper
 def in_conflict(cell, q, vertices):
     """Whether the sphere q lies closer, in power, to the cell's power centre than the cell's own vertices."""
     a0, h0, t0 = row(cell[0], q, vertices)
@@ -114,7 +114,7 @@ def in_conflict(cell, q, vertices):
     return s > 0
 
 
-@njit(cache=True)
+@helper
 def power_centre(cell, q, vertices):
     """Power centre of a cell relative to its sphere q, correctly rounded from exact determinants."""
     centre = np.empty(3)
@@ -149,7 +149,7 @@ def power_centre(cell, q, vertices):
     return centre[0], centre[1], centre[2]
 
 
-@njit(cache=True)
+@helper
 def _others(i):
     """The other three places of a cell."""
     if i == 0:
@@ -161,7 +161,7 @@ def _others(i):
     return 0, 1, 2
 
 
-@njit(cache=True)
+@helper
 def _exact_rows(cell, q, vertices):
     """The rows a_k as (4, 3, 2): each entry the exact sum of a small and a large double."""
     n, points, _ = vertices
@@ -178,7 +178,7 @@ def _exact_rows(cell, q, vertices):
     return rows
 
 
-@njit(cache=True)
+@helper
 def _entry(low, high, out):
     """The expansion low + high."""
     n = 0
@@ -191,7 +191,7 @@ def _entry(low, high, out):
     return n
 
 
-@njit(cache=True)
+@helper
 def _exact_minor2(rows, j, k, u, v, out):
     """rows[j, u] rows[k, v] - rows[j, v] rows[k, u] (at most 16 components)."""
     x = np.empty(2)
@@ -209,7 +209,7 @@ def _exact_minor2(rows, j, k, u, v, out):
     return add(left, nl, right, nr, out)
 
 
-@njit(cache=True)
+@helper
 def _exact_minor(rows, j, k, m, out):
     """det of the rows j, k, m (at most 192 components)."""
     x = np.empty(2)
@@ -227,7 +227,7 @@ def _exact_minor(rows, j, k, m, out):
     return count
 
 
-@njit(cache=True)
+@helper
 def _exact_height(v, q, rows, k, vertices, out):
     """H_k of vertex v in row k (at most 24 components)."""
     n, points, weights = vertices
@@ -264,7 +264,7 @@ def _exact_height(v, q, rows, k, vertices, out):
     return count
 
 
-@njit(cache=True)
+@helper
 def _exact_conflict(cell, q, vertices):
     """Sign of Δ in exact arithmetic."""
     rows = _exact_rows(cell, q, vertices)
@@ -288,7 +288,7 @@ def _exact_conflict(cell, q, vertices):
     return sign(total, add(left, nl, right, nr, total))
 
 
-@njit(cache=True)
+@helper
 def _precedes(u, v, points):
     """Whether vertex u comes before v in lexicographic order of the points (n + 6, 3)."""
     for axis in range(3):
@@ -297,7 +297,7 @@ def _precedes(u, v, points):
     return u < v
 
 
-@njit(cache=True)
+@helper
 def _perturbed_conflict(cell, q, vertices):
     """Sign of Δ when its exact value is zero: that of the first non-zero derivative by a perturbed weight.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from porefv.errors import ComputationError
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES, Box
-from porefv.system.kernels import njit
+from porefv.system.kernels import kernel
 from porefv.tessellation.blocks import triangulate
 from porefv.tessellation.ordering import morton_codes
 from porefv.tessellation.vertices import Vertices
@@ -108,7 +108,7 @@ def exact_origin(box: Box) -> np.ndarray:
     return np.where(box.upper < 0.0, np.ceil(box.upper / grid), origin) * grid
 
 
-@njit(cache=True)
+@kernel
 def _power_centres(found, vertices, length):
     """(m, 3): power centre of each cell, in units of 1 / length; those of cells with walls lie on them exactly."""
     cells, _, planes = found

@@ -13,7 +13,7 @@ import numpy as np
 
 from porefv.mesh.facet_kernels import facet_angles, frame_of
 from porefv.mesh.vectors import dot, minus, vector_at, wall_distance
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 # A hyperboloid as wide at its neck as it is long, which four spheres make, loses pressure over √2 times that length.
 STRETCH = np.sqrt(0.5)
@@ -116,12 +116,14 @@ class Sections(NamedTuple):
     curvature: float
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def section_friction(which, throats, facets, vertices, ends, necks, drag, conductivity, beyond):
+@kernel(error_model="numpy")
+def section_friction(first, last, which, throats, facets, vertices, ends, necks, drag, conductivity, beyond):
     """Fill in length over friction of some throats, and the parts of their friction beyond the Laguerre vertices.
 
     Parameters
     ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
     which : (u,) int array
         The throats.
     throats : ThroatFacets
@@ -135,7 +137,7 @@ def section_friction(which, throats, facets, vertices, ends, necks, drag, conduc
     beyond : (u, 2) array
         Part between the Laguerre vertex and the centre of the first pore, and of the second [-].
     """
-    for row in prange(which.shape[0]):
+    for row in unsigned_range(first, last):
         t = which[row]
         conductivity[row] = 0.0
         beyond[row, 0] = 0.0
@@ -187,7 +189,7 @@ def section_friction(which, throats, facets, vertices, ends, necks, drag, conduc
             beyond[row, 1] = _between(max(last, begin, 0.0), end, sections) / total
 
 
-@njit(cache=True)
+@helper
 def _span(f, facets, vertices, points, length):
     """Heights over facet f, times √½, between which its throat extends: those of two points (m, 3) of its cells.
 
@@ -203,7 +205,7 @@ def _span(f, facets, vertices, points, length):
     return STRETCH * low, STRETCH * high
 
 
-@njit(cache=True)
+@helper
 def _discs(f, facets, vertices, slip, radii, angles):
     """Fill radii (3,) and angles (3,) of the spheres of facet f; returns the length of its edges on no-slip walls."""
     n = vertices.n_spheres
@@ -222,7 +224,7 @@ def _discs(f, facets, vertices, slip, radii, angles):
     return on_walls
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _friction(s, reach, sections):
     """Resistance of a unit of length at height s over the neck, on the way to a pore's centre at height `reach`."""
     growth = 0.0
@@ -242,7 +244,7 @@ def _friction(s, reach, sections):
     return (c1 * perimeter + 2.0 * c2 * area / sections.mean_radius) / (area * area * opening)
 
 
-@njit(cache=True, error_model="numpy")
+@helper(error_model="numpy")
 def _between(low, high, sections):
     """Friction between two heights, 0 <= low < high.
 

@@ -12,6 +12,7 @@ from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.errors import InputError
 from porefv.mesh.throats import Throats
 from porefv.system.number_checks import LEAST, MOST, within_range
+from porefv.system.threads import for_rows
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,9 @@ class SectionFriction(ConductanceModel):
             throats.inscribed_circles(slip)[1],
         )
         conductivity, beyond = np.empty(len(which)), np.empty((len(which), 2))
-        section_friction(
+        for_rows(
+            section_friction,
+            len(which),
             which,
             throats.facets_of_throats,
             mesh.facets.planes,

@@ -15,7 +15,8 @@ import numpy as np
 from porefv.mesh.throats import Throats
 from porefv.mesh.vectors import dot, minus, vector_at
 from porefv.packing.box import WALL_AXES
-from porefv.system.kernels import njit, prange
+from porefv.system.kernels import helper, kernel
+from porefv.system.threads import for_rows
 
 # Least height of the centre over a constriction, as a part of the height of a sphere of vanishing size.
 LEAST_HEIGHT = 0.5
@@ -57,11 +58,11 @@ def centres_of_pores(throats: Throats) -> np.ndarray:
         mesh.local_vertices,
         parts,
     )
-    _pore_centres(pores, mesh.cell_vertices, mesh.local_vertices, parts, centres)
+    for_rows(_pore_centres, mesh.n_pores, pores, mesh.cell_vertices, mesh.local_vertices, parts, centres)
     return centres
 
 
-@njit(cache=True)
+@kernel
 def _shift_parts(throats, lengths, facets, pores, vertices, laguerre_vertices, parts):
     """Fill `parts`: by which part of the distance from a pore's vertex to a sphere of its cells the centre moves there.
 
@@ -113,15 +114,15 @@ def _shift_parts(throats, lengths, facets, pores, vertices, laguerre_vertices, p
                         parts[c, i] = max(parts[c, i], part)
 
 
-@njit(cache=True, parallel=True)
-def _pore_centres(pores, vertices, laguerre_vertices, parts, centres):
-    """Fill the centres (m, 3) of each cell's pore, moved from the cell's own vertex.
+@kernel
+def _pore_centres(first, last, pores, vertices, laguerre_vertices, parts, centres):
+    """Fill in the centres (m, 3) of pores first ... last - 1 for each of their cells, moved from the cell's own vertex.
 
     Where several spheres move the centre, the moves are averaged with the parts as weights. The centre of a pore on a
     wall stays on that wall: the mirror image of the sphere moves it by as much in the other sense.
     """
     n, points, _ = vertices
-    for pore in prange(pores.starts.shape[0] - 1):
+    for pore in range(first, last):
         members = pores.cells[pores.starts[pore] : pores.starts[pore + 1]]
         free = np.ones(3)
         total = 0.0
@@ -144,7 +145,7 @@ def _pore_centres(pores, vertices, laguerre_vertices, parts, centres):
                 centres[c, axis] = v + free[axis] * (x[axis] - weight * v) / total if total > 0.0 else v
 
 
-@njit(cache=True)
+@helper
 def _seen(k, cell_vertices, members):
     """Whether one of the cells has vertex k."""
     for c in members:

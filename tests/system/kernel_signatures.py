@@ -1,0 +1,122 @@
+"""Which kernels scenes need, for which types of arguments: what the package is built with.
+
+python tests/system/kernel_signatures.py            what the record lacks
+python tests/system/kernel_signatures.py --write    records it anew
+"""
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from porefv import HydraulicRadius, Packing, PoreFlow, Walls
+from porefv.cli import main as porefv
+from porefv.system.kernel_build import RECORD, recorded
+from porefv.system.kernel_types import types_text
+from porefv.system.kernels import all_kernels
+from porefv.system.threads import limit_threads
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+
+FLOW = """
+packing = "{data}/packings/{packing}.csv"
+fluid = {{ viscosity = 1.0, density = 1000.0 }}
+walls = {{ y_min = {{ pressure = 1.0 }}, y_max = {{ pressure = 0.0 }}, lateral = {{ slip = {slip} }} }}
+mesh = {{ unite_tolerance = {unite} }}
+flow = {{ conductance = "{model}", solver = "{solver}", gravity = [0.0, 0.0, -9.81] }}
+output = {{ directory = "results/flow", quantities = ["permeability", "pressure", "forces"], vtk = true }}
+"""
+FLOWS = [
+    {"packing": packing, "slip": slip, "unite": unite, "model": model, "solver": solver}
+    for packing, slip, unite, model, solver in (
+        ("n54_s1", "true", 0.01, "section-friction", "direct"),
+        ("n2000_s1", "false", 0.0, "section-friction", "cg"),
+        ("n200_s1", "true", 0.01, "hydraulic-radius", "cg"),
+        ("n25_s1", "false", 0.0, "effective-radius", "auto"),
+        ("sc8", "true", 0.01, "section-friction", "auto"),
+    )
+]
+PACKINGS = (
+    "box = { upper = [0.02, 0.02, 0.02] }\ngrains = { number = 60, ratio = 0.5 }\ncloud = { porosity = 0.7 }",
+    "box = { upper = [0.02, 0.02, 0.02] }\ngrains = { number = 60, ratio = 0.5 }\n"
+    "growth = { stress = 5.0e3, friction_angle = 10.0 }",
+    "box = { upper = [0.02, 0.02, 0.06] }\ngrains = { number = 60, ratio = 0.8 }\n"
+    "settling = { porosity = 0.8, gravity = [0.0, 0.0, -9.81] }",
+)
+SIMULATION = """
+packing = {{ file = "{data}/packings/n25_s1.csv", scale = 0.05 }}
+fluid = {{ viscosity = {viscosity}, density = 1000.0 }}
+walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0 }}, lateral = {{ slip = true }} }}
+output = {{ directory = "results/simulation", profiles = 1.0e-4 }}
+coupling = {{ scheme = "{scheme}" }}
+
+[[stages]]
+name = "dry"
+fluid = false
+damping = 0.2
+plates = {{ z_max = {{ stress = 5.0e3, top_speed = 0.01 }} }}
+rest = {{ unbalanced = 1.0e-2 }}
+
+[[stages]]
+name = "wet"
+plates = {{ z_max = {{ stress = 10.0e3, top_speed = 0.5 }} }}
+duration = 1.0e-3
+permeameter = true
+"""
+SIMULATIONS = [{"scheme": "implicit-drag", "viscosity": 10.0}, {"scheme": "semi-implicit", "viscosity": 1.0e-3}]
+
+
+def run_everything(folder: Path) -> None:
+    """Each kind of scene, small, and the same in Python."""
+    for number, values in enumerate(FLOWS):
+        run(folder, "solve", f"flow_{number}", FLOW.format(data=DATA.as_posix(), **values))
+    for number, text in enumerate(PACKINGS):
+        run(folder, "pack", f"pack_{number}", f'output = "packing_{number}.csv"\n{text}')
+    for number, values in enumerate(SIMULATIONS):
+        run(folder, "simulate", f"simulation_{number}", SIMULATION.format(data=DATA.as_posix(), **values))
+    packing = Packing.read(DATA / "packings" / "n54_s1.csv")
+    for made in (packing, Packing(packing.centres.copy(), packing.radii.copy(), packing.box)):
+        for model in (None, HydraulicRadius()):
+            flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)
+            flow.forces, flow.pore_velocity, flow.to_fipy()
+
+
+def run(folder: Path, command: str, name: str, text: str) -> None:
+    """One scene, which must succeed."""
+    scene = folder / f"{name}.toml"
+    scene.write_text(text, encoding="utf-8")
+    for step in (["check"], [command, "--quiet", "--force"]):
+        if porefv([*step, str(scene)]):
+            raise SystemExit(f"{name}: porefv {step[0]} failed")
+
+
+def needed() -> dict[str, list[str]]:
+    """Signatures that the kernels have been used with in this process."""
+    found = {name: sorted({types_text(types) for types in kernel.signatures}) for name, kernel in all_kernels().items()}
+    return {name: signatures for name, signatures in sorted(found.items()) if signatures}
+
+
+def lacking(record: dict[str, list[str]]) -> list[str]:
+    """What is needed and not in a record."""
+    return [
+        f"{name}({signature})"
+        for name, signatures in needed().items()
+        for signature in signatures
+        if signature not in record.get(name, [])
+    ]
+
+
+def main() -> None:
+    """Compare with the record, or write it."""
+    with tempfile.TemporaryDirectory() as folder:
+        for threads in (1, None):
+            limit_threads(threads)
+            run_everything(Path(folder))
+    if "--write" in sys.argv:
+        RECORD.write_text(json.dumps(needed(), indent=1) + "\n", encoding="utf-8")
+    else:
+        print("\n".join(lacking(recorded())))
+
+
+if __name__ == "__main__":
+    main()
