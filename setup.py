@@ -4,15 +4,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 from setuptools import Command, Distribution, setup
 from setuptools.command.build import build
 
 
 class BuildKernels(Command):
-    """Compile the recorded kernels into the package that is built; a working copy compiles what it uses, when it does."""
+    """Compile the recorded kernels into the package that is built; a working copy compiles what it uses."""
 
-    user_options = []
+    user_options: ClassVar = []
     editable_mode = False
 
     def initialize_options(self) -> None:
@@ -28,7 +29,9 @@ class BuildKernels(Command):
     def run(self) -> None:
         if self.editable_mode:
             return
-        environment = os.environ | {"PYTHONPATH": str(Path(self.build_lib).resolve())}
+        # In an isolated build the variable has the build's requirements.
+        paths = [str(Path(self.build_lib).resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
         command = [sys.executable, "-m", "porefv.system.kernel_build", str(self._folder)]
         subprocess.run(command, env=environment, check=True)
 
@@ -45,7 +48,7 @@ class BuildKernels(Command):
 class Build(build):
     """Python files first, then the kernels in them."""
 
-    sub_commands = [*build.sub_commands, ("build_kernels", None)]
+    sub_commands: ClassVar = [*build.sub_commands, ("build_kernels", None)]
 
 
 class PlatformDistribution(Distribution):

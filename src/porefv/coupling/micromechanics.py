@@ -174,8 +174,8 @@ def _integrals(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: Arr
         if moves.shape != shape or not np.isfinite(moves).all():
             raise InputError(f"{what}, must be finite numbers of shape {shape}, not {moves.shape}")
     integrals = np.zeros((mesh.n_cells, 3, 3))
-    moves = Displacements(u, walls)
-    for_rows(_displacement_integrals, mesh.n_cells, mesh.cells, mesh.cell_vertices, moves, integrals)
+    displacements_of = Displacements(u, walls)
+    for_rows(_displacement_integrals, mesh.n_cells, mesh.cells, mesh.cell_vertices, displacements_of, integrals)
     return integrals
 
 

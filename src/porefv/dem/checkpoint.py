@@ -149,7 +149,7 @@ def unpack(content: Arrays, path: str | PathLike[str]) -> DEM:
             name: Plate(**(plate | {"velocity": tuple(plate["velocity"])})) for name, plate in header["plates"].items()
         }
         return DEM.from_state(
-            state, material, plates, gravity=settings.gravity, damping=settings.damping, step=settings.step
+            state, material, plates, gravity=settings.gravity.tolist(), damping=settings.damping, step=settings.step
         )
 
 

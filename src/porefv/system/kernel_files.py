@@ -86,7 +86,7 @@ class KernelFiles(caching._Cache):
         _announce()
         return None
 
-    def save_overload(self, signature: Any, compiled: CompileResult) -> None:
+    def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep a compiled kernel, where there is room."""
         if not self._enabled:
             return
@@ -180,8 +180,9 @@ def kept_folder() -> Path | None:
 
 
 def _folders() -> Iterator[Path]:
-    if numba.config.CACHE_DIR:
-        yield Path(numba.config.CACHE_DIR) / KEPT
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named:
+        yield Path(named) / KEPT
         return
     yield Path(__file__).resolve().parents[1] / "__pycache__" / KEPT
     from numba.misc.appdirs import AppDirs

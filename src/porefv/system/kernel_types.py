@@ -5,6 +5,7 @@ Each is an expression of Python:
 * `int64`, `bool`;
 * `float64[:, ::1]`: an array in C order; `float64[::1, :]`: in Fortran's; `float64[:, :]`: in any;
 * `const(float64[::1])`: one that is read-only;
+* `record(weight=float64, other=int32)`: an entry of a structured array without gaps; `npy_rng`: a generator;
 * `(int64, float64)`: a tuple;
 * `porefv.mesh.facet_kernels.FacetTopology(cells=int32[:, ::1], ...)`: a named one.
 """
@@ -16,7 +17,11 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from numba import types
+import numba
+import numpy as np
+
+# numba says less of its types than is so.
+types: Any = numba.types
 
 
 def types_text(kinds: Sequence[Any]) -> str:
@@ -36,14 +41,16 @@ def _text(kind: Any) -> str:
         slices = [":"] * kind.ndim
         if kind.layout != "A":
             slices[-1 if kind.layout == "C" else 0] = "::1"
-        text = f"{kind.dtype}[{', '.join(slices)}]"
+        text = f"{_text(kind.dtype)}[{', '.join(slices)}]"
         return text if kind.mutable else f"const({text})"
     if isinstance(kind, types.BaseNamedTuple):
         fields = ", ".join(f"{name}={_text(field)}" for name, field in zip(kind.fields, kind, strict=True))
         return f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}({fields})"
     if isinstance(kind, types.BaseTuple):
         return f"({', '.join(_text(field) for field in kind)},)"
-    return str(kind)
+    if isinstance(kind, types.Record):
+        return f"record({', '.join(f'{name}={_text(field.type)}' for name, field in kind.fields.items())})"
+    return "npy_rng" if kind == types.npy_rng else str(kind)
 
 
 def _type(node: ast.expr) -> Any:
@@ -56,6 +63,8 @@ def _type(node: ast.expr) -> Any:
         return types.Array(_type(node.value), len(slices), layout)
     if isinstance(node, ast.Tuple):
         return types.Tuple([_type(element) for element in node.elts])
+    if isinstance(node, ast.Call) and ast.unparse(node.func) == "record":
+        return numba.from_dtype(np.dtype([(str(field.arg), ast.unparse(field.value)) for field in node.keywords]))
     if isinstance(node, ast.Call) and node.args:
         array = _type(node.args[0])
         return types.Array(array.dtype, array.ndim, array.layout, readonly=True)

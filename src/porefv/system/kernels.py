@@ -19,6 +19,7 @@ from porefv.system.kernel_files import KernelFiles
 __all__ = ["all_kernels", "helper", "kernel", "unsigned_range"]
 
 _kernels: dict[str, Any] = {}
+_njit: Any = numba.njit  # which has more options than it says
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -39,7 +40,7 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if function is None:
         return lambda function: kernel(function, **options)
     # Nobody calls it by way of ctypes: one wrapper less to compile.
-    compiled = numba.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+    compiled = _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
     if compiled is not function:  # as it is where compiling is disabled
         compiled._cache = KernelFiles(compiled)  # what numba's own option `cache` sets, to its own kind of cache
         _kernels[f"{function.__module__}.{function.__qualname__}"] = compiled
@@ -57,16 +58,16 @@ def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda function: helper(function, **options)
-    return numba.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+    return _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 
 @helper
-def unsigned_range(first, last):
+def unsigned_range(first: int, last: int) -> range:
     """range(first, last), of numbers without sign: an array needs no look at whether they count from its end.
 
     Arithmetic with such a number and one with sign gives a float.
     """
-    return range(np.uint64(first), np.uint64(last))
+    return range(np.uint64(first), np.uint64(last))  # type: ignore[arg-type]
 
 
 def all_kernels() -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
@@ -145,15 +146,15 @@ def _variables() -> Iterator[int]:
 
 
 @cache
-def _quota(root: Path = Path("/")) -> float:
-    """Processors' worth of time that the least quota of a control group grants; infinite without one.
+def _quota(root: Path = Path("/")) -> int:
+    """Processors' worth of time that the least quota of a control group grants; `sys.maxsize` without one.
 
     Parameters
     ----------
     root : Path
         Where /proc and /sys are.
     """
-    return min((math.ceil(quota) for quota in _quotas(root)), default=math.inf)
+    return min((math.ceil(quota) for quota in _quotas(root)), default=sys.maxsize)
 
 
 def _quotas(root: Path) -> Iterator[float]:
