@@ -67,34 +67,51 @@ def _meet(i, j, k, centres, radii):
     They do in the plane of their centres, where a point on two of the circles lies in the third disc; if not, the
     lens of two is so thin that it lies within the third.
     """
-    u = centres[j] - centres[i]
-    v = centres[k] - centres[i]
-    d = np.sqrt(np.dot(u, u))
-    e1 = u / d
-    x = np.dot(v, e1)
-    y = np.sqrt(max(np.dot(v, v) - x * x, 0.0))
-    places = np.array([[0.0, 0.0], [d, 0.0], [x, y]])
-    sizes = np.array([radii[i], radii[j], radii[k]])
-    for a in range(3):
-        b = (a + 1) % 3
-        c = (a + 2) % 3
-        along = places[b] - places[a]
-        length = np.sqrt(np.dot(along, along))
-        foot = 0.5 * (length + (sizes[a] - sizes[b]) * (sizes[a] + sizes[b]) / length)
-        half = np.sqrt(max(sizes[a] * sizes[a] - foot * foot, 0.0))
-        for sense in (-1.0, 1.0):
-            px = places[a, 0] + (foot * along[0] - sense * half * along[1]) / length - places[c, 0]
-            py = places[a, 1] + (foot * along[1] + sense * half * along[0]) / length - places[c, 1]
-            if px * px + py * py < sizes[c] * sizes[c] * (1.0 - 1e-12):
-                return True
+    u = _vector(i, j, centres)
+    v = _vector(i, k, centres)
+    d = np.sqrt(_dot(u, u))
+    x = _dot(v, u) / d
+    y = np.sqrt(max(_dot(v, v) - x * x, 0.0))
+    disc_i, disc_j, disc_k = (0.0, 0.0, radii[i]), (d, 0.0, radii[j]), (x, y, radii[k])
+    return (
+        _holds_crossing(disc_i, disc_j, disc_k)
+        or _holds_crossing(disc_j, disc_k, disc_i)
+        or _holds_crossing(disc_k, disc_i, disc_j)
+    )
+
+
+@helper
+def _holds_crossing(a, b, c):
+    """Whether a point where the circles of two discs cross lies in a third; each is x, y and radius."""
+    along_x = b[0] - a[0]
+    along_y = b[1] - a[1]
+    length = np.sqrt(along_x * along_x + along_y * along_y)
+    foot = 0.5 * (length + (a[2] - b[2]) * (a[2] + b[2]) / length)
+    half = np.sqrt(max(a[2] * a[2] - foot * foot, 0.0))
+    for sense in (-1.0, 1.0):
+        px = a[0] + (foot * along_x - sense * half * along_y) / length - c[0]
+        py = a[1] + (foot * along_y + sense * half * along_x) / length - c[1]
+        if px * px + py * py < c[2] * c[2] * (1.0 - 1e-12):
+            return True
     return False
+
+
+@helper
+def _vector(i, j, centres):
+    """From the centre of sphere i to that of j."""
+    return centres[j, 0] - centres[i, 0], centres[j, 1] - centres[i, 1], centres[j, 2] - centres[i, 2]
+
+
+@helper
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @helper
 def _reach(i, j, w, centres, radii, crossings):
     """How far the lens of two spheres reaches beyond a wall that both cross."""
-    u = centres[j] - centres[i]
-    length = np.sqrt(np.dot(u, u))
+    u = _vector(i, j, centres)
+    length = np.sqrt(_dot(u, u))
     up = WALL_SENSES[w] * u[WALL_AXES[w]] / length
     foot = 0.5 * (length + (radii[i] - radii[j]) * (radii[i] + radii[j]) / length)
     # The outermost point of a ball, where it lies in the other; else one of the circle that both surfaces share.

@@ -69,7 +69,10 @@ def part_of_network(network, separator, local, first, last):
             n_links += starts[i + 1] - starts[i]
     outer = np.empty(n_links, np.int32)
     n_outer = 0
-    seen = np.full(separator.max() + 1, -1, np.int32)
+    largest = -1
+    for i in range(separator.shape[0]):
+        largest = max(largest, separator[i])
+    seen = np.full(largest + 1, -1, np.int32)
     new_starts = np.zeros(n_inner + 1, np.int64)
     new_columns = np.empty(n_links, np.int32)
     new_links = np.empty(n_links)
