@@ -171,7 +171,7 @@ def test_nobody_waits_for_a_thread_that_has_not_begun(four):
 
 POOL = """
 import multiprocessing, sys
-from porefv import PoreFlow, Walls
+from porefv import Packing, PoreFlow, Walls
 
 def permeability(path):
     return PoreFlow(Packing.read(path), Walls.along("y")).permeability
