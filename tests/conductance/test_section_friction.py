@@ -286,8 +286,8 @@ def test_pressure_on_patches_is_the_integral_it_says(mesh_of):
     facets = throats.facets_of_throats.facets
     found, drag = np.zeros((2, len(facets), 3, 3))
     apply_pressure_along_throats(
-        0, len(throats), np.arange(len(throats)), throats.facets_of_throats, mesh.facets.planes, mesh.cell_vertices,
-        mesh.local_vertices, ThroatDrops(throats.doubling_heights, np.ones((len(pressure), 3))), found, drag,
+        0, len(throats), 0, throats.facets_of_throats, mesh.facets.planes, mesh.cell_vertices,
+        mesh.local_vertices, ThroatDrops(throats.doubling_heights, np.ones((len(facets), 3))), found, drag,
     )  # fmt: skip
     pressure[facets] = found
     interior = np.flatnonzero((mesh.facets.vertices < mesh.n_spheres).all(axis=1) & (throats.doubling_heights > 0.0))

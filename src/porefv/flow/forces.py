@@ -13,16 +13,17 @@ from porefv.errors import InputError
 from porefv.flow.pressure import PressureField, as_field
 from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
 from porefv.flow.walls import Walls
-from porefv.mesh.facet_kernels import row_sums
 from porefv.mesh.pore_mesh import PoreMesh
+from porefv.mesh.throats import ThroatFacets
+from porefv.mesh.vectors import dot, vector_at
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES
 from porefv.packing.overlaps import sphere_volumes
-from porefv.system.kernels import kernel
+from porefv.system.kernels import helper, kernel
 from porefv.system.number_checks import three_numbers
 from porefv.system.threads import for_rows
 
 # Throats whose forces are in memory at a time.
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 # Shear on a sphere with much room, over u / r with u the throat's mean speed: Stokes', in an unbounded stream.
 SHEAR = 1.5
 
@@ -166,10 +167,11 @@ def grain_forces(
 def facet_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit = "surface") -> np.ndarray:
     """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, pressure and drag [m²].
 
-    `slip` (6,) bool marks the walls that do not drag the fluid; `split` is as of `grain_forces`.
+    `slip` (6,) bool marks the walls that do not drag the fluid; `split` is as of `grain_forces`. A facet within a united pore
+    is taken as a throat of its own.
     """
     forces = np.empty((len(mesh.facets.cells), 3, 3))
-    for rows, unit_forces in _unit_forces(mesh, slip, split):
+    for rows, unit_forces in _unit_forces(mesh, slip, split, within=True):
         forces[rows] = unit_forces.pressure + unit_forces.drag
     return forces
 
@@ -187,89 +189,165 @@ class UnitForces(NamedTuple):
     drag: np.ndarray
 
 
-def _unit_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit) -> Iterator[tuple[np.ndarray, UnitForces]]:
-    """Facets (m,), and the forces on their vertices for unit drops, in blocks.
+class FacetSolids(NamedTuple):
+    """The facets as sections, and the solid along them.
+
+    Attributes
+    ----------
+    vertices : (f, 3) int32 array
+    normals : (f, 3) array
+        [-]
+    fluid_areas, volumes : (f,) arrays
+        A^f, φ [m², m³].
+    sectors, surfaces : (f, 3) arrays
+        A^k, γ^k [m²].
+    """
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    fluid_areas: np.ndarray
+    volumes: np.ndarray
+    sectors: np.ndarray
+    surfaces: np.ndarray
+
+
+class DragLaw(NamedTuple):
+    """How the drag on a throat is divided among its solid.
+
+    Attributes
+    ----------
+    slip : (6,) bool array
+        Walls that do not drag the fluid.
+    sheared : bool
+        Whether surfaces count with the shear on them: the split 'drag'.
+    roundness : (t,) array
+        λ of each throat; empty where `sheared` is false [-].
+    """
+
+    slip: np.ndarray
+    sheared: bool
+    roundness: np.ndarray
+
+
+def _unit_forces(
+    mesh: PoreMesh, slip: np.ndarray, split: ForceSplit, *, within: bool = False
+) -> Iterator[tuple[np.ndarray, UnitForces]]:
+    """Facets (m,) of throats, and the forces on their vertices for unit drops, in blocks; then those within pores.
 
     F^{p,k} = A^k n and F^{v,k} = A^f n γ^k / Σγ. With the split 'drag', the part of the drag that is pressure on the
     spheres along the throat is moved from the second to the first.
     """
     if split not in FORCE_SPLITS:
         raise InputError(f"unknown force split {split!r}; known: {', '.join(FORCE_SPLITS)}")
-    throats = mesh.throats
-    weights = mesh.facets.wetted_surfaces(slip)
-    if split == "drag":
-        volumes = throats.total_by_facet(mesh.facets.volumes)
-        surfaces = throats.total_by_facet(row_sums(weights))
-        roundness = np.append(throats.roundness(slip), 1.0)[throats.facet_throat]  # the last: facets within a pore
-        weights = _sheared(weights, volumes, surfaces, roundness, mesh.facets.vertices, mesh.cell_vertices)
-    sums = throats.total_by_facet(_positive_sum(weights))
-    fractions = _drag_fractions(weights, sums, throats.total_by_facet(np.ones(len(sums))))
-    vectors = throats.total_vectors(mesh.facets.fluid_areas[:, None] * mesh.facets.normals)
-    facets, starts = throats.facets_of_throats
-    within = np.flatnonzero(throats.facet_throat < 0)  # a united pore
-    for first in [*range(0, len(throats), BLOCK), -1]:
-        block = np.arange(first, min(first + BLOCK, len(throats)))
-        rows = facets[starts[block[0]] : starts[block[-1] + 1]] if first >= 0 else within
-        forces = UnitForces(
-            pressure=mesh.facets.sectors[rows, :, None] * mesh.facets.normals[rows, None, :],
-            drag=fractions[rows, :, None] * vectors[rows, None, :],
-        )
-        if split == "drag" and first >= 0:
+    throats, facets, along = mesh.throats, mesh.facets, split == "drag"
+    solids = FacetSolids(
+        facets.vertices, facets.normals, facets.fluid_areas, facets.volumes, facets.sectors, facets.surfaces
+    )
+    law = DragLaw(np.asarray(slip, bool), along, throats.roundness(slip) if along else np.empty(0))
+    own, starts = throats.facets_of_throats
+    for begin in range(0, len(throats), BLOCK):
+        end = min(begin + BLOCK, len(throats))
+        rows = own[starts[begin] : starts[end]]
+        fractions, forces = _room(len(rows))
+        for_rows(
+            _forces_of_throats, end - begin, begin, throats.facets_of_throats, solids, mesh.cell_vertices, law,
+            fractions, forces,
+        )  # fmt: skip
+        if along:
             for_rows(
-                apply_pressure_along_throats,
-                len(block),
-                block,
-                throats.facets_of_throats,
-                mesh.facets.planes,
-                mesh.cell_vertices,
-                mesh.local_vertices,
-                ThroatDrops(throats.doubling_heights, fractions),
-                *forces,
-            )
+                apply_pressure_along_throats, end - begin, begin, throats.facets_of_throats, facets.planes,
+                mesh.cell_vertices, mesh.local_vertices, ThroatDrops(throats.doubling_heights, fractions), *forces,
+            )  # fmt: skip
+        yield rows, forces
+    if within:
+        rows = np.flatnonzero(throats.facet_throat < 0)
+        fractions, forces = _room(len(rows))
+        alone = ThroatFacets(rows, np.arange(len(rows) + 1))
+        law = law._replace(roundness=np.ones(len(rows)))
+        for_rows(_forces_of_throats, len(rows), 0, alone, solids, mesh.cell_vertices, law, fractions, forces)
         yield rows, forces
 
 
+def _room(rows: int) -> tuple[np.ndarray, UnitForces]:
+    """Fractions (m, 3) and forces of so many facets, to be filled in."""
+    return np.empty((rows, 3)), UnitForces(*np.empty((2, rows, 3, 3)))
+
+
 @kernel
-def _sheared(weights, volumes, surfaces, roundness, facet_vertices, vertices):
-    """(f, 3): wetted surfaces times the shear on them, relative to a narrow throat: √(1 + (c R_h / r)²), on walls λ.
+def _forces_of_throats(first, last, begin, throats, solids, vertices, law, fractions, forces):
+    """Fill in the forces on the facets of throats for a unit pressure drop, and the fractions of the drag.
+
+    The pressure drops in the plane of the facets. Drag is divided by the γ^k, of which the negative ones that a signed
+    decomposition can give count as zero; where no γ^k is positive, equally.
+
+    Parameters
+    ----------
+    first, last : int
+        Throats to treat, first ... last - 1, counted from `begin` on.
+    begin : int
+        The throat whose first facet is in row 0 of what is filled in.
+    throats : ThroatFacets
+    solids : FacetSolids
+    vertices : Vertices
+    law : DragLaw
+    fractions : (m, 3) array
+        Of the throat's drag, for each vertex of each of its facets [-].
+    forces : UnitForces
+    """
+    n = vertices.n_spheres
+    for t in range(begin + first, begin + last):
+        start = throats.starts[t]
+        count = throats.starts[t + 1] - start
+        row = start - throats.starts[begin]
+        f = throats.facets[start]
+        volume = 0.0
+        surface = 0.0
+        x = y = z = 0.0
+        for j in range(count):
+            g = throats.facets[start + j]
+            # In the sense of the throat's first facet.
+            sense = 1.0 if dot(vector_at(f, solids.normals), vector_at(g, solids.normals)) > 0.0 else -1.0
+            along = sense * solids.fluid_areas[g]
+            x += along * solids.normals[g, 0]
+            y += along * solids.normals[g, 1]
+            z += along * solids.normals[g, 2]
+            volume += solids.volumes[g]
+            for v in range(3):
+                fractions[row + j, v] = solids.surfaces[g, v]
+                k = solids.vertices[g, v]
+                if k >= n and law.slip[k - n]:
+                    fractions[row + j, v] = 0.0
+            surface += fractions[row + j, 0] + fractions[row + j, 1] + fractions[row + j, 2]
+        if law.sheared and volume > 0.0 and surface > 0.0:
+            for j in range(count):
+                for v in range(3):
+                    k = solids.vertices[throats.facets[start + j], v]
+                    fractions[row + j, v] *= (
+                        _relative_shear(volume / surface, vertices.sizes[k]) if k < n else law.roundness[t]
+                    )
+        total = 0.0
+        for j in range(count):
+            for v in range(3):
+                fractions[row + j, v] = max(fractions[row + j, v], 0.0)
+                total += fractions[row + j, v]
+        for j in range(count):
+            g = throats.facets[start + j]
+            sense = 1.0 if dot(vector_at(f, solids.normals), vector_at(g, solids.normals)) > 0.0 else -1.0
+            drag = (sense * x, sense * y, sense * z)
+            for v in range(3):
+                fractions[row + j, v] = fractions[row + j, v] / total if total > 0.0 else 1.0 / (3.0 * count)
+                for axis in range(3):
+                    forces.pressure[row + j, v, axis] = solids.sectors[g, v] * solids.normals[g, axis]
+                    forces.drag[row + j, v, axis] = fractions[row + j, v] * drag[axis]
+
+
+@helper
+def _relative_shear(hydraulic_radius, radius):
+    """Shear on a sphere relative to that in a narrow throat: √(1 + (c R_h / r)²).
 
     It is in proportion to 1 / R_h in a throat that is narrow for its spheres, to c / r on a sphere with much room.
     """
-    sheared = weights.copy()
-    for f in range(weights.shape[0]):
-        if volumes[f] <= 0.0 or surfaces[f] <= 0.0:
-            continue
-        radius = volumes[f] / surfaces[f]
-        for v in range(3):
-            k = facet_vertices[f, v]
-            if k < vertices.n_spheres:
-                sheared[f, v] *= np.sqrt(1.0 + (SHEAR * radius / vertices.sizes[k]) ** 2)
-            else:
-                sheared[f, v] *= roundness[f]
-    return sheared
-
-
-@kernel
-def _positive_sum(weights):
-    """(f,): sum of the positive weights of each facet."""
-    sums = np.zeros(weights.shape[0])
-    for f in range(weights.shape[0]):
-        for v in range(3):
-            sums[f] += max(weights[f, v], 0.0)
-    return sums
-
-
-@kernel
-def _drag_fractions(weights, sums, facets):
-    """(f, 3): γ^k / Σγ, the negative γ^k that a signed decomposition can give taken as zero.
-
-    Where no γ^k is positive, the drag is divided equally among the vertices of all the facets of the throat.
-    """
-    fractions = np.empty_like(weights)
-    for f in range(weights.shape[0]):
-        for v in range(3):
-            fractions[f, v] = max(weights[f, v], 0.0) / sums[f] if sums[f] > 0.0 else 1.0 / (3.0 * facets[f])
-    return fractions
+    return np.sqrt(1.0 + (SHEAR * hydraulic_radius / radius) ** 2)
 
 
 @kernel

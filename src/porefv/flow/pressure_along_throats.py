@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.conductance.section_friction.friction_kernels import STRETCH
-from porefv.mesh.vectors import cross_product, dot, minus, towards, unit, vector_at
-from porefv.system.kernels import helper, kernel, unsigned_range
+from porefv.mesh.vectors import cross_product, dot, minus, towards, vector_at
+from porefv.system.kernels import helper, kernel
 
 # Points on each triangle, towards its pore's vertex and across: 3 % of what they move, in the mean square.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(2)
@@ -29,50 +29,61 @@ _ACROSS, _ACROSS_WEIGHTS = 0.5 * (_ACROSS + 1.0), 0.5 * _ACROSS_WEIGHTS
 
 
 class ThroatDrops(NamedTuple):
-    """How the pressure falls along each throat, by facet.
+    """How the pressure falls along throats.
 
     Attributes
     ----------
     doubling_heights : (f,) array
-        e, the height at which the section of the facet's throat is twice its neck's; not positive: left out [m].
-    drag_fractions : (f, 3) array
-        Of the drag on the throat's solid, among the vertices of all its facets [-].
+        e, the height at which the section of each facet's throat is twice its neck's; not positive: left out [m].
+    drag_fractions : (m, 3) array
+        Of the drag on the throat's solid, for the vertices of the facets that are treated [-].
     """
 
     doubling_heights: np.ndarray
     drag_fractions: np.ndarray
 
 
-class Fall(NamedTuple):
-    """Fall of the pressure along a throat on one side of its neck.
+class Patches(NamedTuple):
+    """Patches of one throat after another, in groups of `_LANES`, whose integrals are worked out side by side.
 
     Attributes
     ----------
-    scale : float
-        β / e [1/m].
-    end : float
-        Φ at the pore's Laguerre vertex, negative on the first side [-].
-    drop : float
-        Part of the throat's pressure drop on this side [-].
+    fields : (g * _FIELDS * _LANES,) array
+        Group after group, and in a group place after place, `_A` to `_DROP`: what a patch is given by. The first three
+        are its force, once that is integrated [m²].
+    senses : (g * _LANES,) array
+        1 or -1: the sense of the facet in its throat.
+    rows, places : (g * _LANES,) int64 arrays
+        Row of the facet among those that are treated, and place of the sphere in the facet.
     """
 
-    scale: float
-    end: float
-    drop: float
+    fields: np.ndarray
+    senses: np.ndarray
+    rows: np.ndarray
+    places: np.ndarray
+
+
+# Eight numbers are two vectors of AVX2, or one of AVX-512.
+_LANES = 8
+# So many groups, 70 kB, are integrated at a time.
+_GROUPS = 64
+# Places in `Patches.fields`: vectors from the sphere's centre to its two neighbours in the neck and to the pore's
+# Laguerre vertex, the facet's normal, the sphere's radius, β / e, Φ at the vertex, the part of the drop on that side.
+_A, _B, _C, _NORMAL, _RADIUS, _SCALE, _END, _DROP, _FIELDS = 0, 3, 6, 9, 12, 13, 14, 15, 16
 
 
 @kernel(error_model="numpy")
 def apply_pressure_along_throats(
-    first, last, which, throats, facets, vertices, laguerre_vertices, drops, pressure, drag
+    first, last, begin, throats, facets, vertices, laguerre_vertices, drops, pressure, drag
 ):
     """Move the part of the drag that is pressure along the throats from `drag` to `pressure`.
 
     Parameters
     ----------
     first, last : int
-        Rows to treat: first ... last - 1.
-    which : (u,) int array
-        Consecutive throats to treat.
+        Throats to treat, first ... last - 1, counted from `begin` on.
+    begin : int
+        The throat whose first facet is in row 0 of `pressure` and `drag`.
     throats : ThroatFacets
     facets : FacetPlanes
     vertices : Vertices
@@ -80,62 +91,168 @@ def apply_pressure_along_throats(
         Of the cells [m].
     drops : ThroatDrops
     pressure, drag : (m, 3, 3) arrays
-        Forces on the vertices of the facets of the throats to treat, one after another, for a unit pressure drop, added
-        to in place [m²]. Their sum stays.
+        Forces on the vertices of the facets of throats from `begin` on, one after another, for a unit pressure drop,
+        added to in place [m²]. Their sum stays.
     """
-    n, points, _ = vertices
-    for i in unsigned_range(first, last):
-        start = throats.starts[which[i]]
-        own = throats.facets[start : throats.starts[which[i] + 1]]
-        row = start - throats.starts[which[0]]
-        f = own[0]
-        height = drops.doubling_heights[f]
-        if not height > 0.0:
+    most = 0
+    for t in range(begin + first, begin + last):
+        most = max(most, throats.starts[t + 1] - throats.starts[t])
+    groups = _GROUPS + 1 + 6 * most // _LANES
+    room = groups * _LANES
+    # Lanes that are not filled hold ones.
+    patches = Patches(np.ones(room * _FIELDS), np.empty(room), np.empty(room, np.int64), np.empty(room, np.int64))
+    ends = np.empty(room, np.int64)  # of the patches of each throat that has any
+    listed = np.empty(room, np.int64)  # that throat
+    count = 0
+    n_listed = 0
+    for t in range(begin + first, begin + last):
+        before = count
+        count = _list_patches(t, count, begin, throats, facets, vertices, laguerre_vertices, drops, patches)
+        if count > before:
+            listed[n_listed] = t
+            ends[n_listed] = count
+            n_listed += 1
+        if count >= _GROUPS * _LANES or t == begin + last - 1:
+            for group in range((count + _LANES - 1) // _LANES):
+                _integrate(group, patches.fields)
+            p = 0
+            for k in range(n_listed):
+                _move(listed[k], p, ends[k], begin, throats, facets, vertices, drops, patches, pressure, drag)
+                p = ends[k]
+            count = 0
+            n_listed = 0
+
+
+@helper(error_model="numpy")
+def _list_patches(t, count, begin, throats, facets, vertices, laguerre_vertices, drops, patches):
+    """Add the patches of throat t to those that are listed; returns how many there are then."""
+    start = throats.starts[t]
+    n_facets = throats.starts[t + 1] - start
+    f = throats.facets[start]
+    height = drops.doubling_heights[f]
+    if not height > 0.0:
+        return count
+    scale = STRETCH / height
+    normal = vector_at(f, facets.normals)
+    origin = vector_at(facets.vertices[f, 0], vertices.points)
+    # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
+    pi = vector_at(facets.cells[f, 0], laguerre_vertices)
+    pj = vector_at(facets.cells[f, 1], laguerre_vertices)
+    low = min(_fall(scale * dot(minus(pi, origin), normal), 1.0), 0.0)
+    high = max(_fall(scale * dot(minus(pj, origin), normal), 1.0), 0.0)
+    if not high - low > 0.0:
+        return count
+    row = start - throats.starts[begin]
+    for j in range(n_facets):
+        own = throats.facets[start + j]
+        sense = _sense(own, f, facets) if j > 0 else 1.0
+        for v in range(3):
+            k = facets.vertices[own, v]
+            if k >= vertices.n_spheres:
+                continue
+            after, before = facets.vertices[f, (v + 1) % 3], facets.vertices[f, (v + 2) % 3]
+            if n_facets > 1:
+                after, before = _neighbours(k, j, throats.facets[start : start + n_facets], facets)
+                if after < 0:
+                    continue
+            a = towards(k, after, vertices)
+            b = towards(k, before, vertices)
+            centre = vector_at(k, vertices.points)
+            for side in range(2):
+                end = high if side == 1 else low
+                drop = abs(end) / (high - low)
+                if drop > 0.0:
+                    patches.rows[count] = row + j
+                    patches.places[count] = v
+                    patches.senses[count] = sense
+                    lane = _lane(count)
+                    _set_vector(patches.fields, lane, _A, a)
+                    _set_vector(patches.fields, lane, _B, b)
+                    _set_vector(patches.fields, lane, _C, minus(pj if side == 1 else pi, centre))
+                    _set_vector(patches.fields, lane, _NORMAL, normal)
+                    _set(patches.fields, lane, _RADIUS, vertices.sizes[k])
+                    _set(patches.fields, lane, _SCALE, scale)
+                    _set(patches.fields, lane, _END, end)
+                    _set(patches.fields, lane, _DROP, drop)
+                    count += 1
+    return count
+
+
+@helper
+def _lane(patch):
+    """Index of the first field of a patch: numbers without sign, between whose distances are constants."""
+    return np.uint64(patch // _LANES) * np.uint64(_FIELDS * _LANES) + np.uint64(patch % _LANES)
+
+
+@helper
+def _get(fields, lane, place):
+    return fields[lane + np.uint64(place * _LANES)]
+
+
+@helper
+def _set(fields, lane, place, value):
+    fields[lane + np.uint64(place * _LANES)] = value
+
+
+@helper
+def _get_vector(fields, lane, place):
+    return _get(fields, lane, place), _get(fields, lane, place + 1), _get(fields, lane, place + 2)
+
+
+@helper
+def _set_vector(fields, lane, place, vector):
+    _set(fields, lane, place, vector[0])
+    _set(fields, lane, place + 1, vector[1])
+    _set(fields, lane, place + 2, vector[2])
+
+
+@helper
+def _move(t, first, last, begin, throats, facets, vertices, drops, patches, pressure, drag):
+    """Add the forces of a throat's patches first ... last - 1 to `pressure`, and take their sum from `drag`."""
+    start = throats.starts[t]
+    n_facets = throats.starts[t + 1] - start
+    row = start - throats.starts[begin]
+    x = y = z = 0.0
+    for p in range(first, last):
+        row_of, v, sense = patches.rows[p], patches.places[p], patches.senses[p]
+        fx, fy, fz = _get_vector(patches.fields, _lane(p), 0)
+        pressure[row_of, v, 0] += sense * fx
+        pressure[row_of, v, 1] += sense * fy
+        pressure[row_of, v, 2] += sense * fz
+        x += fx
+        y += fy
+        z += fz
+    # A pressure on a wall falls along the throat, too. It takes up what spheres bear along the wall's normal: with the
+    # throat's image behind the wall they would bear nothing.
+    on_walls = 0
+    for j in range(n_facets):
+        own = throats.facets[start + j]
+        sense = _sense(own, throats.facets[start], facets) if j > 0 else 1.0
+        for v in range(3):
+            part = sense * drops.drag_fractions[row + j, v]
+            drag[row + j, v, 0] -= part * x
+            drag[row + j, v, 1] -= part * y
+            drag[row + j, v, 2] -= part * z
+            on_walls += facets.vertices[own, v] >= vertices.n_spheres
+    if on_walls > 0:
+        own = throats.facets[start : start + n_facets]
+        _move_to_walls((x, y, z), row, own, facets, vertices, drops, pressure, drag)
+
+
+@helper
+def _move_to_walls(moved, row, own, facets, vertices, drops, pressure, drag):
+    """Take the components across walls from the pressure on these, instead of from the drag."""
+    for axis in range(3):
+        on_wall = _wall_across(axis, own, facets, vertices)
+        if on_wall == 0:
             continue
-        scale = STRETCH / height
-        normal = vector_at(f, facets.normals)
-        origin = vector_at(facets.vertices[f, 0], points)
-        # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
-        pi = vector_at(facets.cells[f, 0], laguerre_vertices)
-        pj = vector_at(facets.cells[f, 1], laguerre_vertices)
-        low = min(_fall(scale * dot(minus(pi, origin), normal), 1.0), 0.0)
-        high = max(_fall(scale * dot(minus(pj, origin), normal), 1.0), 0.0)
-        if not high - low > 0.0:
-            continue
-        moved = np.zeros(3)
         for j in range(own.shape[0]):
-            sense = _sense(own[j], f, facets)
+            sense = _sense(own[j], own[0], facets)
             for v in range(3):
                 k = facets.vertices[own[j], v]
-                if k >= n:
-                    continue
-                after, before = facets.vertices[f, (v + 1) % 3], facets.vertices[f, (v + 2) % 3]
-                if own.shape[0] > 1:
-                    after, before = _neighbours(k, j, own, facets)
-                    if after < 0:
-                        continue
-                a = unit(towards(k, after, vertices))
-                b = unit(towards(k, before, vertices))
-                centre = vector_at(k, points)
-                for side in range(2):
-                    end = high if side == 1 else low
-                    drop = abs(end) / (high - low)
-                    if drop > 0.0:
-                        c = unit(minus(pj if side == 1 else pi, centre))
-                        patch = _patch(a, b, c, vertices.sizes[k], normal, Fall(scale, end, drop))
-                        for axis in range(3):
-                            pressure[row + j, v, axis] += sense * patch[axis]
-                            moved[axis] += patch[axis]
-        for axis in range(3):
-            on_wall = _wall_across(axis, own, facets, vertices)
-            for j in range(own.shape[0]):
-                sense = _sense(own[j], f, facets)
-                for v in range(3):
-                    k = facets.vertices[own[j], v]
-                    if on_wall == 0:
-                        drag[row + j, v, axis] -= sense * drops.drag_fractions[own[j], v] * moved[axis]
-                    elif k >= n and points[k, axis] != 0.0:
-                        pressure[row + j, v, axis] -= sense * moved[axis] / on_wall
+                drag[row + j, v, axis] += sense * drops.drag_fractions[row + j, v] * moved[axis]
+                if k >= vertices.n_spheres and vertices.points[k, axis] != 0.0:
+                    pressure[row + j, v, axis] -= sense * moved[axis] / on_wall
 
 
 @helper
@@ -146,11 +263,7 @@ def _sense(f, first, facets):
 
 @helper
 def _wall_across(axis, own, facets, vertices):
-    """How many of a throat's own facets stand on a wall across an axis.
-
-    Its pressure falls along the throat, too, and takes up what spheres bear along the axis: with the throat's image
-    behind the wall they would bear nothing.
-    """
+    """How many of a throat's own facets stand on a wall across an axis."""
     count = 0
     for j in range(own.shape[0]):
         for v in range(3):
@@ -215,41 +328,57 @@ def _fall(x, square):
     return t - t * t * t / 3.0
 
 
-@helper(error_model="numpy")
-def _patch(a, b, c, radius, normal, fall):
-    """Force on a sphere's patch by the pressure's fall (`Fall`) between a pore's Laguerre vertex and the neck.
+@helper(error_model="numpy", fastmath={"contract"})
+def _integrate(group, fields):
+    """Force on the patches of a group by the pressure's fall between a pore's Laguerre vertex and the neck.
 
-    The patch spans between three unit vectors from the sphere's centre: a and b in the neck, c to the vertex. There is
+    A patch spans between three unit vectors from the sphere's centre: a and b in the neck, c to the vertex. There is
     none where points on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a
     facet's corner of nearly 180° with the vertex opposite in its plane.
+
+    All patches of the group do the same, for the loop over them to be done in vectors: the loops over points are
+    unrolled. Products and sums are fused where the processor can.
     """
-    scale, end, drop = fall
-    steep = dot(c, normal)
-    # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
-    volume = dot(cross_product(a, b), c)
-    seen = 0.0
-    x = 0.0
-    y = 0.0
-    z = 0.0
-    for i in range(_NODES.shape[0]):
-        wc = _NODES[i]
-        height = scale * radius * wc * steep  # over e / β, times the point's distance
-        for j in range(_ACROSS.shape[0]):
-            wb = (1.0 - wc) * _ACROSS[j]
-            wa = 1.0 - wc - wb
-            u = wa * a[0] + wb * b[0] + wc * c[0]
-            w = wa * a[1] + wb * b[1] + wc * c[1]
-            q = wa * a[2] + wb * b[2] + wc * c[2]
-            far = u * u + w * w + q * q
-            left = min(max(1.0 - _fall(height, far) / end, 0.0), 1.0)
-            # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
-            solid = _WEIGHTS[i] * _ACROSS_WEIGHTS[j] * (1.0 - wc) * volume / (far * far)
-            seen += abs(solid) * np.sqrt(far)
-            weight = left * solid
-            x += weight * u
-            y += weight * w
-            z += weight * q
-    if not seen <= 2.0 * np.pi:
-        return 0.0, 0.0, 0.0
-    factor = -drop * radius * radius
-    return factor * x, factor * y, factor * z
+    begin = _lane(group * _LANES)
+    for i in range(np.uint64(_LANES)):
+        lane = begin + i
+        a = _direction(_get_vector(fields, lane, _A))
+        b = _direction(_get_vector(fields, lane, _B))
+        c = _direction(_get_vector(fields, lane, _C))
+        radius = _get(fields, lane, _RADIUS)
+        # Over e / β, times the point's distance.
+        top = _get(fields, lane, _SCALE) * radius * dot(c, _get_vector(fields, lane, _NORMAL))
+        inverse_end = 1.0 / _get(fields, lane, _END)
+        # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
+        volume = dot(cross_product(a, b), c)
+        seen = 0.0
+        x = 0.0
+        y = 0.0
+        z = 0.0
+        for p in range(2):
+            wc = _NODES[p]
+            for q in range(3):
+                wb = (1.0 - wc) * _ACROSS[q]
+                wa = 1.0 - wc - wb
+                u = wa * a[0] + wb * b[0] + wc * c[0]
+                v = wa * a[1] + wb * b[1] + wc * c[1]
+                w = wa * a[2] + wb * b[2] + wc * c[2]
+                far = u * u + v * v + w * w
+                left = min(max(1.0 - _fall(top * wc, far) * inverse_end, 0.0), 1.0)
+                # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
+                solid = (_WEIGHTS[p] * _ACROSS_WEIGHTS[q] * (1.0 - wc)) * volume / (far * far)
+                seen += abs(solid) * np.sqrt(far)
+                weight = left * solid
+                x += weight * u
+                y += weight * v
+                z += weight * w
+        factor = -_get(fields, lane, _DROP) * radius * radius if seen <= 2.0 * np.pi else 0.0
+        _set_vector(fields, lane, 0, (factor * x, factor * y, factor * z))
+
+
+@helper(error_model="numpy")
+def _direction(v):
+    """v / |v|, or v where that is zero, without a branch."""
+    square = dot(v, v)
+    factor = 1.0 / np.sqrt(square if square > 0.0 else 1.0)
+    return factor * v[0], factor * v[1], factor * v[2]
