@@ -13,6 +13,7 @@ from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
+from porefv.results.force_table import force_table
 
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 
@@ -110,7 +111,7 @@ def test_a_table_of_each_format_equals_the_csv_file_to_the_last_bit(flow, everyt
     assert names(directory) == [f"forces.{table_format}", "summary.json"]
     found = results.read(directory)
     assert found.forces.dtype == everything.forces.dtype
-    assert found.forces.tobytes() == everything.forces.tobytes() == results.force_table(flow).tobytes()
+    assert found.forces.tobytes() == everything.forces.tobytes() == force_table(flow).tobytes()
     assert found.summary["forces"]["table"] == f"forces.{table_format}"
 
 

@@ -1,8 +1,7 @@
 """Results directories of a steady flow: `write(flow, directory)` and `read(directory)`."""
 
 from porefv.results.drawing import draw
-from porefv.results.force_table import force_table
 from porefv.results.reading import Results, read
 from porefv.results.writing import QUANTITIES, write
 
-__all__ = ["QUANTITIES", "Results", "draw", "force_table", "read", "write"]
+__all__ = ["QUANTITIES", "Results", "draw", "read", "write"]

@@ -10,14 +10,14 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.flow.pore_flow import PoreFlow
 from porefv.packing.box import WALL_AXES, WALLS
+from porefv.system.csv_lines import csv_lines
 from porefv.system.tables import TABLE_FORMATS, read_table, write_table
 
 PARTS = ("pressure", "viscous", "buoyancy", "total")
 FORCE_FILES = {table_format: f"forces.{table_format}" for table_format in TABLE_FORMATS}
 _NUMBERS = ("x", "y", "z", "radius", *(f"{part}_{axis}" for part in PARTS for axis in "xyz"))
 _COLUMNS = ("id", *_NUMBERS)
-# Rows of a CSV file that are Python's objects at the same time; these take four times the memory of an array.
-_ROWS_AT_ONCE = 4096
+_RADIUS = _COLUMNS.index("radius")
 
 
 def write_forces(flow: PoreFlow, path: Path) -> None:
@@ -99,31 +99,19 @@ def _check(table: np.ndarray) -> None:
 
 
 def _write_csv(table: np.ndarray, path: Path) -> None:
-    # repr gives the shortest text that reads back to the same number.
-    line = "%s" + ",%r" * len(_NUMBERS) + "\n"
-    with path.open("w", encoding="utf-8") as file:
-        file.write(",".join(_COLUMNS) + "\n")
-        for first in range(0, len(table) - 6, _ROWS_AT_ONCE):
-            rows = table[first : min(first + _ROWS_AT_ONCE, len(table) - 6)]
-            file.writelines(map(line.__mod__, rows.tolist()))
-        file.writelines((line % row).replace(",nan,", ",,", 1) for row in table[-6:].tolist())
+    spheres, walls = table[:-6], table[-6:]
+    with path.open("wb") as file:
+        file.write(f"{','.join(_COLUMNS)}\n".encode())
+        file.writelines(csv_lines(np.stack([spheres[name] for name in _NUMBERS], axis=1)))
+        for name, *numbers in walls.tolist():
+            cells = [name, *map(repr, numbers)]
+            cells[_RADIUS] = ""
+            file.write(f"{','.join(cells)}\n".encode())
 
 
 def _read_csv(path: Path) -> np.ndarray:
     header, *lines = path.read_text(encoding="utf-8").splitlines()
     if header != ",".join(_COLUMNS):
         raise ValueError("its first line does not name the columns")
-    rows = [_row(number, line) for number, line in enumerate(lines, 2)]
-    return np.array(rows, dtype=_type(_ids(len(rows) - 6)))
-
-
-def _row(number: int, line: str) -> tuple[Any, ...]:
-    """A line of forces.csv: name and numbers."""
-    name, *cells = line.split(",")
-    if name in WALLS and len(cells) > 3 and cells[3] == "":
-        cells[3] = "nan"
-    elif "nan" in cells:
-        raise ValueError(f"line {number} lacks a number")
-    if len(cells) != len(_NUMBERS):
-        raise ValueError(f"line {number} has {len(cells) + 1} cells instead of {len(_COLUMNS)}")
-    return name, *map(float, cells)
+    lines[-6:] = [line.replace(",,", ",nan,", 1) for line in lines[-6:]]
+    return np.loadtxt(lines, _type(_ids(len(lines) - 6)), delimiter=",", comments=None, ndmin=1)

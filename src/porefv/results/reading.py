@@ -35,7 +35,7 @@ class Results:
 
     @cached_property
     def forces(self) -> np.ndarray:
-        """The table of forces, of forces.csv, forces.npy or forces.parquet: see `porefv.results.force_table`.
+        """Structured array of the table of forces: a row per sphere, then per wall, whose radius is NaN.
 
         Raises
         ------

@@ -55,7 +55,7 @@ def write(
     vtk : bool
         Write pores.vtu, spheres.vtp and throats.vtp.
     table_format : str
-        Of the table of forces: "csv", "npy" (an array of NumPy, `porefv.results.force_table`) or "parquet".
+        Of the table of forces: "csv", "npy" (an array of NumPy, as `Results.forces` is) or "parquet".
     force : bool
         Replace results that exist.
 
