@@ -74,7 +74,8 @@ def test_info_prints_a_summary(scene, capsys):
     out = capsys.readouterr().out
     for line in (
         r"Packing\n", r"  porosity +0\.5335", r"  throats +240\n", r"  permeability +0\.000190\d+ m²\n",
-        r"  hydraulic conductivity +\S+ m/s\n", r"  force balance +\S+\n", r"  solver +direct, .* imbalance",
+        r"  hydraulic conductivity +\S+ m/s\n", r"  force balance +\S+\n",
+        r"  table +forces\.csv\n", r"  solver +direct, .* imbalance",
     ):  # fmt: skip
         assert re.search(line, out), line
 

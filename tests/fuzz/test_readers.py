@@ -226,6 +226,36 @@ def test_a_damaged_table_of_forces_is_read_or_refused(solved, damage):
         event("refused")
 
 
+@pytest.fixture(scope="module", params=["npy", "parquet"])
+def binary_table(request, folder):
+    """The path of a table of forces, and its sound content."""
+    if request.param == "parquet":
+        pytest.importorskip("pyarrow")
+    flow = PoreFlow(PACKING, Walls.along("y"), Fluid(1.0))
+    directory = results.write(flow, folder / request.param, vtk=False, table_format=request.param)
+    path = directory / f"forces.{request.param}"
+    return path, path.read_bytes()
+
+
+@settings(FUZZ)
+@given(damage=changes)
+@example(damage=[(0.0, 10**6, b"")])
+@example(damage=[(0.0, 6, b"\x93NUMPX")])
+@example(damage=[(0.0, 2, b"PK")])
+@example(damage=[(0.5, 1, b"")])
+@example(damage=[(1.0, 0, b"behind")])
+def test_a_damaged_binary_table_of_forces_is_read_or_refused(binary_table, damage):
+    path, sound = binary_table
+    path.write_bytes(damaged(sound, damage))
+    try:
+        table = results.read(path.parent).forces
+        assert table.dtype.names[0] == "id"
+        event("read")
+    except PorefvError as error:
+        assert path.name in str(error)
+        event("refused")
+
+
 # ---- VTK's XML -----------------------------------------------------------------------------------------------
 
 

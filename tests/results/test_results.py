@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from porefv import results
-from porefv.errors import ComputationError, InputError
+from porefv.errors import ComputationError, InputError, MissingExtraError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
+from porefv.results.force_table import force_table
 
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 
@@ -102,6 +103,40 @@ def test_forces_of_the_table_read_back_to_the_last_bit(flow, everything):
     assert list(table[202][["x", "y", "z"]]) == [0.5, 0.0, 0.5]  # the middle of y_min
 
 
+@pytest.mark.parametrize("table_format", ["npy", "parquet"])
+def test_a_table_of_each_format_equals_the_csv_file_to_the_last_bit(flow, everything, tmp_path, table_format):
+    if table_format == "parquet":
+        pytest.importorskip("pyarrow")
+    directory = results.write(flow, tmp_path / "results", quantities=["forces"], vtk=False, table_format=table_format)
+    assert names(directory) == [f"forces.{table_format}", "summary.json"]
+    found = results.read(directory)
+    assert found.forces.dtype == everything.forces.dtype
+    assert found.forces.tobytes() == everything.forces.tobytes() == force_table(flow).tobytes()
+    assert found.summary["forces"]["table"] == f"forces.{table_format}"
+
+
+def test_npy_table_is_read_by_numpy_alone(flow, everything, tmp_path):
+    directory = results.write(flow, tmp_path / "results", quantities=["forces"], vtk=False, table_format="npy")
+    table = np.load(directory / "forces.npy")  # refuses pickles
+    assert table.dtype.names == everything.forces.dtype.names
+    np.testing.assert_array_equal(table["total_z"][:200], flow.forces.total[:, 2] + 0.0)
+
+
+def test_parquet_table_has_texts_and_doubles(flow, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    directory = results.write(flow, tmp_path / "results", quantities=["forces"], vtk=False, table_format="parquet")
+    kinds = {str(field.type) for field in parquet.read_schema(directory / "forces.parquet")}
+    assert kinds == {"string", "double"}
+
+
+def test_lines_of_the_csv_file_are_the_shortest_texts_that_read_back(everything):
+    header, first, *_, last = (everything.directory / "forces.csv").read_text().splitlines()
+    row, wall = everything.forces[0].tolist(), everything.forces[-1].tolist()
+    assert header == ",".join(everything.forces.dtype.names)
+    assert first == ",".join([row[0], *map(repr, row[1:])])
+    assert last == ",".join([wall[0], *map(repr, wall[1:4]), "", *map(repr, wall[5:])])
+
+
 def test_table_has_no_negative_zeros(flow, everything):
     assert "-0.0," not in (everything.directory / "forces.csv").read_text()
 
@@ -153,6 +188,11 @@ def test_unknown_quantity_is_refused(flow, tmp_path):
         results.write(flow, tmp_path / "results", quantities=["drag"])
 
 
+def test_unknown_table_format_is_refused(flow, tmp_path):
+    with pytest.raises(InputError, match="unknown table_format 'xlsx'; known: csv, npy, parquet"):
+        results.write(flow, tmp_path / "results", table_format="xlsx")
+
+
 # Overwriting
 
 
@@ -165,6 +205,12 @@ def test_results_are_replaced_only_by_force(flow, tmp_path):
     results.write(flow, directory, quantities=["permeability"], vtk=False, force=True)
     assert names(directory) == ["summary.json"]
     assert names(tmp_path) == ["results"]
+
+
+def test_a_table_of_another_format_is_replaced_with_the_results(flow, tmp_path):
+    directory = results.write(flow, tmp_path / "results", quantities=["forces"], vtk=False, table_format="npy")
+    results.write(flow, directory, quantities=["forces"], vtk=False, force=True)
+    assert names(directory) == ["forces.csv", "summary.json"]
 
 
 def test_files_of_others_are_never_replaced(flow, tmp_path):
@@ -212,6 +258,14 @@ def test_missing_vtk_is_said_before_any_computation(flow, tmp_path, monkeypatch)
     assert "conductances" not in vars(fresh)
 
 
+def test_missing_pyarrow_is_said_before_any_computation(flow, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    fresh = PoreFlow(flow.mesh, flow.walls)
+    with pytest.raises(MissingExtraError, match="Writing forces.parquet needs .* pip install pyarrow"):
+        results.write(fresh, tmp_path / "results", vtk=False, table_format="parquet")
+    assert "conductances" not in vars(fresh) and not (tmp_path / "results").exists()
+
+
 # Reading
 
 
@@ -234,6 +288,31 @@ def test_what_was_not_asked_for_cannot_be_read(flow, tmp_path):
         found.forces  # noqa: B018
     with pytest.raises(InputError, match="has no pores.vtu: set vtk = true"):
         found.pores  # noqa: B018
+
+
+def test_a_parquet_table_is_not_read_without_pyarrow(flow, tmp_path, monkeypatch):
+    found = results.read(results.write(flow, tmp_path / "k", quantities=["permeability"], vtk=False))
+    (tmp_path / "k" / "forces.parquet").write_bytes(b"PAR1")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match="Reading forces.parquet needs .* pip install pyarrow"):
+        found.forces  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda table: np.arange(3.0), "its columns are not id, x, y"),
+        (lambda table: table[["id", "x"]].copy(), "its columns are not id, x, y"),
+        (lambda table: table.astype([(name, "U5") for name in table.dtype.names]), "not texts .id. and doubles"),
+        (lambda table: table[:-1], "its rows are not the spheres .* and then the six walls"),
+        (lambda table: (table["x"].__setitem__(7, np.nan), table)[1], r"row 7 lacks a number \(x\)"),
+    ],
+)
+def test_what_is_no_table_of_forces_is_refused(flow, tmp_path, damage, reason):
+    directory = results.write(flow, tmp_path / "results", quantities=["forces"], vtk=False, table_format="npy")
+    np.save(directory / "forces.npy", damage(np.load(directory / "forces.npy")))
+    with pytest.raises(InputError, match=f"forces.npy is damaged: .*{reason}.*. Solve again"):
+        results.read(directory).forces  # noqa: B018
 
 
 def test_numbers_need_no_vtk():

@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 
 from porefv.conductance.effective_radius import EffectiveRadius
 from porefv.conductance.registry import AUTO
-from porefv.errors import ComputationError, InputError
+from porefv.errors import ComputationError, InputError, MissingExtraError
 from porefv.scenes.flow_scene import FlowScene
 from porefv.scenes.toml_file import line_of
 
@@ -72,6 +73,29 @@ def test_every_key_is_understood():
     assert scene.flow.gravity == (0.0, 0.0, -9.81)
     assert scene.output.quantities == ("permeability", "pressure", "forces")
     assert scene.output.vtk is True
+
+
+@pytest.mark.parametrize("table_format", ["csv", "npy"])
+def test_scene_chooses_the_format_of_the_table(write_scene, table_format):
+    output = f'quantities = ["forces"]\ntable_format = "{table_format}"'
+    directory = FlowScene.read(write_scene('quantities = ["permeability"]', output)).solve()
+    assert sorted(path.name for path in directory.iterdir()) == [f"forces.{table_format}", "summary.json"]
+
+
+def test_check_and_solve_say_that_pyarrow_is_missing(write_scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr(FlowScene, "read_packing", lambda self: pytest.fail("read"))
+    output = 'quantities = ["forces"]\ntable_format = "parquet"'
+    scene = FlowScene.read(write_scene('quantities = ["permeability"]', output))
+    for refuses in (scene.check, scene.solve):
+        with pytest.raises(MissingExtraError, match="Writing forces.parquet needs .* pip install pyarrow"):
+            refuses()
+
+
+def test_unknown_table_format_is_refused_with_its_line(write_scene):
+    path = write_scene('quantities = ["permeability"]', 'table_format = "nyp"')
+    with pytest.raises(InputError, match="line 10.* table_format .*npy"):
+        FlowScene.read(path)
 
 
 def test_what_a_scene_leaves_out_has_defaults():

@@ -308,18 +308,34 @@ def test_results_are_replaced_by_force_only_and_other_files_never(path, capsys, 
 
 def test_parquet_is_missed_before_the_run(path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    path.write_text(DRY + "[output]\nparquet = true\n")
-    with pytest.raises(MissingExtraError, match="pip install pyarrow"):
-        simulate.run(SimulationScene.read(path))
+    path.write_text(DRY + '[output]\ntable_format = "parquet"\n')
+    for refuses in (simulate.run, simulate.check):
+        with pytest.raises(MissingExtraError, match="Writing series.parquet needs .* pip install pyarrow"):
+            refuses(SimulationScene.read(path))
     assert not (path.parent / "results").exists()
 
 
 def test_parquet_has_what_the_series_has(path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    found = run(path, DRY + "[output]\nparquet = true\n")
+    found = run(path, DRY + '[output]\ntable_format = "parquet"\n')
     table, rows = parquet.read_table(found / "series.parquet"), read_series(found)
     assert tuple(table.column_names) == rows.dtype.names
     assert np.array_equal(table["strain_z"].to_numpy(), rows["strain_z"])
+
+
+def test_npy_has_what_series_and_profiles_have_until_the_run_begins_anew(path):
+    found = run(path, DRY + '[output]\ntable_format = "npy"\nprofiles = 0.01\n')
+    for name, rows in (("series.npy", read_series(found)), ("profiles.npy", read_profiles(found))):
+        table = np.load(found / name)
+        assert table.dtype == rows.dtype and table.tobytes() == rows.tobytes()
+    run(path, DRY, "--force")
+    assert not list(found.glob("*.npy"))
+
+
+def test_the_old_key_of_parquet_files_is_refused_with_the_new_one(path):
+    path.write_text(DRY + "[output]\nparquet = true\n")
+    with pytest.raises(InputError, match='line .* write table_format = "parquet" instead of parquet = true'):
+        SimulationScene.read(path)
 
 
 def test_frames_are_taken_at_the_times_asked(path):

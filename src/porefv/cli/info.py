@@ -112,6 +112,7 @@ def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     rows = [(part, f"({vector_text(sums[part])}) N") for part in ("pressure", "viscous", "buoyancy", "total")]
     rows.append(("walls, total", f"({vector_text(sums['wall_total'])}) N"))
     rows.append(("force balance", f"{summary['forces']['conservation_residual']:.1e}"))
+    rows.append(("table", summary["forces"].get("table", "forces.csv")))  # the only one until 0.1
     return rows
 
 

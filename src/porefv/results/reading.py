@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.results.force_table import read_forces
+from porefv.results.force_table import FORCE_FILES, read_forces
 from porefv.system.optional_imports import load
 
 if TYPE_CHECKING:
@@ -35,14 +35,15 @@ class Results:
 
     @cached_property
     def forces(self) -> np.ndarray:
-        """Structured array of forces.csv: a row per sphere, then per wall, whose radius is NaN.
+        """Structured array of the table of forces: a row per sphere, then per wall, whose radius is NaN.
 
         Raises
         ------
         InputError
-            If forces were not asked for.
+            If forces were not asked for, or the table is damaged.
         """
-        return read_forces(self._file("forces.csv", 'add "forces" to the quantities'))
+        written = (name for name in FORCE_FILES.values() if (self.directory / name).is_file())
+        return read_forces(self._file(next(written, FORCE_FILES["csv"]), 'add "forces" to the quantities'))
 
     @cached_property
     def pores(self) -> pyvista.UnstructuredGrid:

@@ -6,7 +6,7 @@ import json
 import math
 import platform
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ import numpy as np
 
 from porefv.errors import ComputationError
 from porefv.packing.box import WALLS
+from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def summary_json(
     *,
     quantities: Collection[str],
     vtk: bool,
+    table_format: str,
     seconds: Mapping[str, float],
     scene: str | None = None,
     packing: str | None = None,
@@ -45,7 +47,7 @@ def summary_json(
     mesh : PoreMesh
     flow : PoreFlow or None
         None: the pores alone.
-    quantities, vtk
+    quantities, vtk, table_format
         What was asked for.
     seconds : mapping of str to float
         Wall time of each stage.
@@ -58,9 +60,9 @@ def summary_json(
         "quantities": list(quantities),
         "packing": {"file": packing, **_packing(mesh)},
         "mesh": _mesh(mesh),
-        **({} if flow is None else _flow(flow, quantities)),
+        **({} if flow is None else _flow(flow, quantities, table_format)),
         "seconds": {**seconds, "total": sum(seconds.values())},
-        "versions": _versions(vtk),
+        "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
         "units": UNITS,
     }
     try:
@@ -100,7 +102,7 @@ def _mesh(mesh: PoreMesh) -> dict[str, Any]:
     }
 
 
-def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
+def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dict[str, Any]:
     walls = {
         name: {"pressure": wall.pressure, "slip": bool(wall.slip)} for name, wall in zip(WALLS, flow.walls, strict=True)
     }
@@ -129,6 +131,7 @@ def _flow(flow: PoreFlow, quantities: Collection[str]) -> dict[str, Any]:
             "sums": forces.sums,
             "thrust": forces.thrust,
             "conservation_residual": forces.conservation_residual,
+            "table": FORCE_FILES[table_format],
         }
     return found
 
@@ -153,9 +156,9 @@ def _unusual(flow: PoreFlow) -> dict[str, int | None]:
     return {name: None if found is None else int(np.count_nonzero(found)) for name, found in counts.items()}
 
 
-def _versions(vtk: bool) -> dict[str, str]:
+def _versions(used: Sequence[str]) -> dict[str, str]:
     found = {"porefv": __version__, "python": platform.python_version()}
-    for name in ("numpy", "scipy", "numba", *(["vtk"] if vtk else [])):
+    for name in ("numpy", "scipy", "numba", *used):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

@@ -3,7 +3,7 @@
 A directory holds what was asked for of::
 
     summary.json   numbers of the whole sample, what was done and how long it took
-    forces.csv     forces on every sphere, then on the six walls
+    forces.csv     forces on every sphere, then on the six walls; or forces.npy, forces.parquet
     pores.vtu      the space-filling mesh: pressure, void volume and velocity of the pores
     spheres.vtp    centres with radii and forces
     throats.vtp    the network: flux, conductance, hydraulic radius and length of the throats
@@ -24,13 +24,14 @@ from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_pol
 from porefv.export.vtk_files import vtk_data_model, write_xml
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.results.force_table import PARTS, write_forces
+from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
 from porefv.results.summary import summary_json
 from porefv.system.atomic_files import atomic_directory
 from porefv.system.progress import Progress
+from porefv.system.tables import check_table_format
 
 QUANTITIES = ("permeability", "pressure", "forces")
-FILES = ("summary.json", "forces.csv", "pores.vtu", "spheres.vtp", "throats.vtp")
+FILES = ("summary.json", *FORCE_FILES.values(), "pores.vtu", "spheres.vtp", "throats.vtp")
 
 
 def write(
@@ -39,6 +40,7 @@ def write(
     *,
     quantities: Collection[str] = QUANTITIES,
     vtk: bool = True,
+    table_format: str = "csv",
     force: bool = False,
 ) -> Path:
     """Compute what is asked for, as far as it is not yet, and write a results directory.
@@ -52,40 +54,43 @@ def write(
         Among `QUANTITIES`.
     vtk : bool
         Write pores.vtu, spheres.vtp and throats.vtp.
+    table_format : str
+        Of the table of forces: "csv", "npy" (an array of NumPy, as `Results.forces` is) or "parquet".
     force : bool
         Replace results that exist.
 
     Raises
     ------
     InputError
-        For an unknown quantity, or if the results cannot be written: before anything is computed.
+        For an unknown quantity or format, or if the results cannot be written: before anything is computed.
     """
     unknown = [quantity for quantity in quantities if quantity not in QUANTITIES]
     if unknown:
         raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
-    with writing(directory, force=force, vtk=vtk) as folder:
-        save(folder, flow.mesh, flow, quantities=quantities, vtk=vtk)
+    with writing(directory, force=force, vtk=vtk, table_format=table_format) as folder:
+        save(folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format)
     return Path(directory)
 
 
 @contextmanager
-def writing(directory: str | PathLike[str], *, force: bool, vtk: bool) -> Iterator[Path]:
+def writing(directory: str | PathLike[str], *, force: bool, vtk: bool, table_format: str) -> Iterator[Path]:
     """A temporary folder that becomes the results directory if the block succeeds; see `check_target`."""
-    check_target(directory, vtk=vtk)
+    check_target(directory, vtk=vtk, table_format=table_format)
     with atomic_directory(directory, force=force) as folder:
         yield folder
 
 
-def check_target(directory: str | PathLike[str], *, vtk: bool) -> None:
-    """Refuse, before anything is computed, a directory that cannot be written or replaced.
+def check_target(directory: str | PathLike[str], *, vtk: bool, table_format: str) -> None:
+    """Refuse, before anything is computed, a directory or files that cannot be written or replaced.
 
     Raises
     ------
     InputError
-        If it holds results and other things besides, or its parent is not writable.
+        If it holds results and other things besides, its parent is not writable, or the format is unknown.
     MissingExtraError
-        If `vtk` is asked for and VTK is not installed.
+        If VTK or pyarrow is needed, and not installed.
     """
+    check_table_format(table_format, "forces")
     if vtk:
         vtk_data_model()
     directory = Path(directory)
@@ -122,6 +127,7 @@ def save(
     *,
     quantities: Collection[str],
     vtk: bool,
+    table_format: str,
     progress: Progress | None = None,
     scene: str | None = None,
     packing: str | None = None,
@@ -135,7 +141,7 @@ def save(
     mesh : PoreMesh
     flow : PoreFlow or None
         None: the mesh alone.
-    quantities, vtk
+    quantities, vtk, table_format
         As for `write`.
     progress : Progress, optional
         Has the stages that `stages` returns; quiet by default.
@@ -158,12 +164,13 @@ def save(
                 flow.pore_velocity  # noqa: B018
     with progress.stage("writing"):
         if flow is not None and "forces" in quantities:
-            write_forces(flow, folder / "forces.csv")
+            write_forces(flow, folder / FORCE_FILES[table_format])
         if vtk:
             _write_vtk(folder, mesh, flow, quantities)
     text = summary_json(
-        mesh, flow, quantities=quantities, vtk=vtk, seconds=progress.seconds, scene=scene, packing=packing
-    )
+        mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds, scene=scene,
+        packing=packing,
+    )  # fmt: skip
     (folder / "summary.json").write_text(text, encoding="utf-8")
 
 

@@ -31,6 +31,7 @@ from porefv.scenes.table import MadeFrom, Scene, Table
 from porefv.scenes.values import Choice, Choices, Limits, ScenePath, Vector, key
 from porefv.solvers.solver import SOLVERS, TOLERANCE
 from porefv.system.progress import Progress
+from porefv.system.tables import TABLE_FORMATS
 
 PartOfRadius = Annotated[float, Limits("must lie in [0, 1) (a fraction of a radius)", least=0.0, below=1.0)]
 
@@ -108,6 +109,11 @@ class FlowOutput(Table):
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
+    table_format: Annotated[str, Choice(TABLE_FORMATS)] = key(
+        'format of the table of forces: `"csv"`, or for many spheres `"npy"` (NumPy) or `"parquet"`, which needs '
+        "pyarrow",
+        "csv",
+    )
 
 
 class FlowScene(Scene):
@@ -212,15 +218,15 @@ class FlowScene(Scene):
         """
         progress = progress or Progress(self.stages, quiet=True)
         output = self.output
-        with writing(output.directory, force=force, vtk=output.vtk) as folder:
+        with writing(output.directory, force=force, vtk=output.vtk, table_format=output.table_format) as folder:
             with progress.stage("reading"):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
             flow = self.pore_flow(mesh) if output.quantities else None
             save(
-                folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, progress=progress,
-                scene=str(self.path) if self.path else None, packing=str(self.packing.file),
+                folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
+                progress=progress, scene=str(self.path) if self.path else None, packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
 
@@ -237,5 +243,5 @@ class FlowScene(Scene):
         InputError
             As `solve`, save that results may exist.
         """
-        check_target(self.output.directory, vtk=self.output.vtk)
+        check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
         return self.pore_mesh().packing

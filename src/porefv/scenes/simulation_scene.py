@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -25,6 +25,7 @@ from porefv.scenes.stage import Stage
 from porefv.scenes.table import MadeFrom, OneOf, Scene, Table
 from porefv.scenes.values import Choice, Fraction, Limits, ScenePath, Seconds, Vector, Whole, key
 from porefv.scenes.walls_in_time_tables import FirstWallsTable, Times
+from porefv.system.tables import TABLE_FORMATS
 
 AXES = ("x", "y", "z")
 # Intervals of the series in a stage of given duration, and steps between rows of one without.
@@ -84,6 +85,8 @@ class CouplingTable(ConductanceTable):
 class SimulationOutput(Table):
     """What is recorded, and where."""
 
+    advice: ClassVar[Mapping[str, str]] = {"parquet": 'write table_format = "parquet" instead of parquet = true'}
+
     directory: ScenePath = key("where the results go", "results")
     every: Seconds | None = key(
         "interval between rows of the series", None, unit="s", shown="1/200 of the stage; 100 steps in one to rest"
@@ -93,7 +96,11 @@ class SimulationOutput(Table):
     axis: Annotated[str, Choice(AXES)] = key("axis across the layers, and of the permeameter", "z")
     frames: Moments | None = key("interval between frames for ParaView, or a list of times", None, unit="s")
     contacts: bool = key("whether frames have the contacts, too", False)
-    parquet: bool = key("whether to write the series also as a Parquet file, which needs pyarrow", False)
+    table_format: Annotated[str, Choice(TABLE_FORMATS)] = key(
+        'format of the series and profiles when the run is complete: `"npy"` (NumPy) or `"parquet"`, which needs '
+        "pyarrow, beside the CSV files, which grow with the run",
+        "csv",
+    )
 
 
 class Saving(Table):

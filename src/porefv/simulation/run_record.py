@@ -18,7 +18,7 @@ from porefv.coupling.coupling import Coupling
 from porefv.dem import checkpoint as dry_checkpoint
 from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
-from porefv.simulation.series import PARQUET, PROFILES, SERIES
+from porefv.simulation.series import FILES
 from porefv.system.atomic_files import atomic_write
 from porefv.system.version import __version__
 
@@ -217,7 +217,7 @@ def clear(directory: Path) -> None:
             if _FRAME.fullmatch(path.name):
                 path.unlink()
         names = [name for name in os.listdir(directory) if _CHECKPOINT.fullmatch(name)]
-        for name in (*names, SERIES, PROFILES, PARQUET, RECORD):
+        for name in (*names, *FILES, RECORD):
             (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write {directory}: {error.strerror}") from None

@@ -12,9 +12,10 @@ import numpy as np
 
 from porefv.errors import FORCE_OPTION, InputError
 from porefv.system.atomic_files import atomic_write
-from porefv.system.optional_imports import ensure_installed
+from porefv.system.tables import TABLE_FORMATS, write_table
 
-SERIES, PROFILES, PARQUET = "series.csv", "profiles.csv", "series.parquet"
+SERIES, PROFILES = "series.csv", "profiles.csv"
+FILES = tuple(f"{stem}.{table_format}" for stem in ("series", "profiles") for table_format in TABLE_FORMATS)
 
 
 class Series:
@@ -93,17 +94,12 @@ def _read(path: Path) -> np.ndarray:
         raise InputError(f"{path} is damaged: {error}") from None
 
 
-def require_parquet() -> None:
-    """MissingExtraError without pyarrow."""
-    ensure_installed("pyarrow", "pyarrow", "Writing series.parquet")
+def copy_tables(directory: Path, table_format: str) -> None:
+    """Write the series, and the profiles if there are any, as .npy or Parquet files beside the CSV files.
 
-
-def write_parquet(directory: Path) -> None:
-    """series.parquet: the same as series.csv, a column of doubles for each of its own."""
-    import pyarrow
-    from pyarrow import parquet
-
-    rows = read_series(directory)
-    table = pyarrow.table({name: rows[name] for name in rows.dtype.names or ()})
-    with atomic_write(directory / PARQUET) as temporary:
-        parquet.write_table(table, temporary)
+    Columns are doubles, NaN where a cell of the CSV file is empty.
+    """
+    for path in (directory / SERIES, directory / PROFILES):
+        if path.is_file():
+            with atomic_write(path.with_suffix(f".{table_format}")) as temporary:
+                write_table(_read(path), temporary)

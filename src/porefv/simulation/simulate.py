@@ -33,8 +33,9 @@ from porefv.simulation.run_record import (
     is_simulation,
     read_record,
 )
-from porefv.simulation.series import PROFILES, SERIES, Series, require_parquet, write_parquet
+from porefv.simulation.series import PROFILES, SERIES, Series, copy_tables
 from porefv.system.progress import Progress
+from porefv.system.tables import check_table_format
 
 # Most steps at once, and between two looks at whether grains are at rest.
 _STRIDE = 100
@@ -72,10 +73,7 @@ def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, pr
     """
     progress = progress or Progress(quiet=True)
     directory = scene.output.directory
-    if scene.output.parquet:
-        require_parquet()
-    if scene.output.frames is not None:
-        vtk_data_model()
+    _check_packages(scene)
     record = _to_resume(scene) if resume else None
     if record is not None and record.status == "complete" and len(record.spans) == len(scene.stages):
         return directory
@@ -109,11 +107,19 @@ def check(scene: SimulationScene) -> DEM:
     InputError
         As `run`, save that results may exist.
     """
+    _check_packages(scene)
     check_directory(scene.output.directory, force=True)
     grains = scene.grains()
     if any(stage.fluid for stage in scene.stages):
         PoreMesh(grains.packing)
     return grains
+
+
+def _check_packages(scene: SimulationScene) -> None:
+    """MissingExtraError if the output needs a package that is not installed."""
+    check_table_format(scene.output.table_format, "series")
+    if scene.output.frames is not None:
+        vtk_data_model()
 
 
 def _to_resume(scene: SimulationScene) -> RunRecord | None:
@@ -233,8 +239,8 @@ class _Run:
             with self.progress.stage(stages[k].name):
                 self._enter(k)
                 self._follow(k)
-        if self.scene.output.parquet:
-            write_parquet(self.directory)
+        if self.scene.output.table_format != "csv":
+            copy_tables(self.directory, self.scene.output.table_format)
         record.status = "complete"
         self._save(ended=True)
 
