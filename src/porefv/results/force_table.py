@@ -10,7 +10,6 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.flow.pore_flow import PoreFlow
 from porefv.packing.box import WALL_AXES, WALLS
-from porefv.system.csv_lines import csv_lines
 from porefv.system.tables import TABLE_FORMATS, read_table, write_table
 
 PARTS = ("pressure", "viscous", "buoyancy", "total")
@@ -18,6 +17,8 @@ FORCE_FILES = {table_format: f"forces.{table_format}" for table_format in TABLE_
 _NUMBERS = ("x", "y", "z", "radius", *(f"{part}_{axis}" for part in PARTS for axis in "xyz"))
 _COLUMNS = ("id", *_NUMBERS)
 _RADIUS = _COLUMNS.index("radius")
+# Rows of a CSV file that are text in memory at a time.
+_ROWS = 1 << 16
 
 
 def write_forces(flow: PoreFlow, path: Path) -> None:
@@ -100,13 +101,16 @@ def _check(table: np.ndarray) -> None:
 
 def _write_csv(table: np.ndarray, path: Path) -> None:
     spheres, walls = table[:-6], table[-6:]
-    with path.open("wb") as file:
-        file.write(f"{','.join(_COLUMNS)}\n".encode())
-        file.writelines(csv_lines(np.stack([spheres[name] for name in _NUMBERS], axis=1)))
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"{','.join(_COLUMNS)}\n")
+        # repr gives the shortest text that reads back to the same number.
+        for first in range(0, len(spheres), _ROWS):
+            rows = spheres[first : first + _ROWS].tolist()
+            file.writelines(f"{name},{','.join(map(repr, numbers))}\n" for name, *numbers in rows)
         for name, *numbers in walls.tolist():
             cells = [name, *map(repr, numbers)]
             cells[_RADIUS] = ""
-            file.write(f"{','.join(cells)}\n".encode())
+            file.write(f"{','.join(cells)}\n")
 
 
 def _read_csv(path: Path) -> np.ndarray:
