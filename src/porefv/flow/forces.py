@@ -167,8 +167,8 @@ def grain_forces(
 def facet_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit = "surface") -> np.ndarray:
     """(f, 3, 3): force on each vertex of each facet for a unit pressure drop across it, pressure and drag [m²].
 
-    `slip` (6,) bool marks the walls that do not drag the fluid; `split` is as of `grain_forces`. A facet within a united pore
-    is taken as a throat of its own.
+    `slip` (6,) bool marks the walls that do not drag the fluid; `split` is as of `grain_forces`. A facet within a
+    united pore is taken as a throat of its own.
     """
     forces = np.empty((len(mesh.facets.cells), 3, 3))
     for rows, unit_forces in _unit_forces(mesh, slip, split, within=True):

@@ -24,8 +24,14 @@ LEAST_SPAN = 0.1
 # Beyond its poles a sphere still slows the fluid down: at s > r as a disc of this part of its radius times (r / s)².
 LEAST_DISC = 0.3
 # Four points in either half of a throat integrate its friction within some 0.3 %.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_POINTS = 4
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_POINTS)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+# The points of both halves are worked out side by side, in vectors.
+_LANES = 2 * _POINTS
+# What is known of each point: its height s, the height of the pore's centre on its side, the weight of its friction in
+# the integral; v and 1 - v of `_list_to_poles`.
+_HEIGHT, _REACH, _WEIGHT, _V, _LEFT, _FIELDS = 0, 1, 2, 3, 4, 5
 
 
 class Ends(NamedTuple):
@@ -71,11 +77,14 @@ class Drag(NamedTuple):
         c₁ and c₂ of `SectionFriction` [-].
     slip : (6,) bool array
         Walls of symmetry, without friction.
+    powers : (n,) array
+        ∛r² of each sphere [m^⅔].
     """
 
     friction: float
     curvature: float
     slip: np.ndarray
+    powers: np.ndarray
 
 
 class Sections(NamedTuple):
@@ -88,7 +97,8 @@ class Sections(NamedTuple):
     on_walls : float
         Length of the perimeter on no-slip walls [m].
     radii, angles : (v,) arrays
-        Radius of the sphere at each vertex of the facets and its angle θ there, 0 for walls [m, -].
+        Radius of the sphere at each vertex of the facets and its angle θ there; three at least, the rest with θ = 0
+        [m, -].
     widest : float
         The largest radius [m].
     mean_radius : float
@@ -135,58 +145,82 @@ def section_friction(first, last, which, throats, facets, vertices, ends, necks,
     conductivity : (u,) array
         0 without a fluid area [m⁴].
     beyond : (u, 2) array
-        Part between the Laguerre vertex and the centre of the first pore, and of the second [-].
+        Part between the Laguerre vertex and the centre of the first pore, and of the second [-]; without rows, it is
+        not worked out.
     """
+    most = 0
+    for row in range(first, last):
+        most = max(most, throats.starts[which[row] + 1] - throats.starts[which[row]])
+    radii = np.empty(3 * most)
+    angles = np.empty(3 * most)
+    points = np.ones(_FIELDS * _LANES)
     for row in unsigned_range(first, last):
         t = which[row]
         conductivity[row] = 0.0
-        beyond[row, 0] = 0.0
-        beyond[row, 1] = 0.0
+        if beyond.shape[0] > 0:
+            beyond[row, 0] = 0.0
+            beyond[row, 1] = 0.0
         if necks.areas[t] <= 0.0:
             continue
-        start = throats.starts[t]
-        count = throats.starts[t + 1] - start
-        radii = np.zeros(3 * count)
-        angles = np.zeros(3 * count)
-        on_walls = 0.0
-        for i in range(count):
-            f = throats.facets[start + i]
-            on_walls += _discs(f, facets, vertices, drag.slip, radii[3 * i : 3 * i + 3], angles[3 * i : 3 * i + 3])
-        widest = radii.max()
-        total_angle = angles.sum()
-        mean = 0.0
-        for v in range(radii.shape[0]):
-            if radii[v] > 0.0:
-                mean += angles[v] * np.cbrt(radii[v] / widest) ** 2
-        sections = Sections(
-            neck=necks.areas[t],
-            on_walls=on_walls,
-            radii=radii,
-            angles=angles,
-            widest=widest,
-            mean_radius=widest * np.sqrt(mean / total_angle) ** 3,
-            doubling_height=np.sqrt(2.0 * necks.areas[t] / total_angle),
-            opening_factor=necks.roundness[t] ** 1.5,
-            portion=necks.portions[t],
-            friction=drag.friction,
-            curvature=drag.curvature,
-        )
-        f = throats.facets[start]
+        sections = _sections(t, throats, facets, vertices, necks, drag, radii, angles)
+        f = throats.facets[throats.starts[t]]
         begin, end = _span(f, facets, vertices, ends.centres, necks.lengths[t])
-        first, last = _span(f, facets, vertices, ends.laguerre_vertices, necks.lengths[t])
-        if end - begin < 1e-9 * max(widest, abs(begin), abs(end)):
-            conductivity[row] = 1.0 / _friction(abs(end), abs(end), sections)
+        if end - begin < 1e-9 * max(sections.widest, abs(begin), abs(end)):
+            conductivity[row] = 1.0 / _friction(abs(end), abs(end), sections, points)
             continue
-        total = 0.0
-        if begin < 0.0:
-            total += _between(max(-end, 0.0), -begin, sections)
-        if end > 0.0:
-            total += _between(max(begin, 0.0), end, sections)
+        down, up = _both_halves(max(-end, 0.0), -begin, max(begin, 0.0), end, sections, points)
+        total = down + up
         conductivity[row] = STRETCH * necks.lengths[t] / total
-        if -begin > max(-first, -end, 0.0):
-            beyond[row, 0] = _between(max(-first, -end, 0.0), -begin, sections) / total
-        if end > max(last, begin, 0.0):
-            beyond[row, 1] = _between(max(last, begin, 0.0), end, sections) / total
+        if beyond.shape[0] > 0:
+            low, high = _span(f, facets, vertices, ends.laguerre_vertices, necks.lengths[t])
+            down, up = _both_halves(max(-low, -end, 0.0), -begin, max(high, begin, 0.0), end, sections, points)
+            beyond[row, 0] = down / total
+            beyond[row, 1] = up / total
+
+
+@helper
+def _sections(t, throats, facets, vertices, necks, drag, radii, angles):
+    """`Sections` of throat t; `radii` and `angles` are room for its discs."""
+    start = throats.starts[t]
+    count = throats.starts[t + 1] - start
+    n_discs = 0
+    on_walls = 0.0
+    widest = 0.0
+    total_angle = 0.0
+    mean = 0.0
+    for i in range(count):
+        f = throats.facets[start + i]
+        frame = frame_of(f, facets, vertices)
+        of_vertices = facet_angles(frame, vertices.n_spheres)
+        on_walls += _edges_on_walls(frame, vertices, drag.slip)
+        for v in range(3):
+            k = facets.vertices[f, v]
+            if k < vertices.n_spheres:
+                radii[n_discs] = vertices.sizes[k]
+                angles[n_discs] = of_vertices[v]
+                n_discs += 1
+                widest = max(widest, vertices.sizes[k])
+                total_angle += of_vertices[v]
+                mean += of_vertices[v] * drag.powers[k]
+    mean /= total_angle
+    while n_discs < 3:  # walls take the place of a disc without an arc
+        radii[n_discs] = widest
+        angles[n_discs] = 0.0
+        n_discs += 1
+    roundness = necks.roundness[t]
+    return Sections(
+        neck=necks.areas[t],
+        on_walls=on_walls,
+        radii=radii[:n_discs],
+        angles=angles[:n_discs],
+        widest=widest,
+        mean_radius=mean * np.sqrt(mean),
+        doubling_height=np.sqrt(2.0 * necks.areas[t] / total_angle),
+        opening_factor=roundness * np.sqrt(roundness),
+        portion=necks.portions[t],
+        friction=drag.friction,
+        curvature=drag.curvature,
+    )
 
 
 @helper
@@ -206,16 +240,9 @@ def _span(f, facets, vertices, points, length):
 
 
 @helper
-def _discs(f, facets, vertices, slip, radii, angles):
-    """Fill radii (3,) and angles (3,) of the spheres of facet f; returns the length of its edges on no-slip walls."""
+def _edges_on_walls(frame, vertices, slip):
+    """Length of a facet's edges on no-slip walls [m]."""
     n = vertices.n_spheres
-    frame = frame_of(f, facets, vertices)
-    angles[0], angles[1], angles[2] = facet_angles(frame, n)
-    radii[0] = vertices.sizes[frame.a]
-    if frame.b < n:
-        radii[1] = vertices.sizes[frame.b]
-    if frame.c < n:
-        radii[2] = vertices.sizes[frame.c]
     on_walls = 0.0
     if frame.b >= n and not slip[frame.b - n]:
         on_walls += wall_distance(frame.a, frame.c, vertices)
@@ -225,57 +252,176 @@ def _discs(f, facets, vertices, slip, radii, angles):
 
 
 @helper(error_model="numpy")
-def _friction(s, reach, sections):
+def _friction(s, reach, sections, points):
     """Resistance of a unit of length at height s over the neck, on the way to a pore's centre at height `reach`."""
-    growth = 0.0
-    perimeter = sections.on_walls
-    for v in range(sections.radii.shape[0]):
-        r = sections.radii[v]
-        angle = sections.angles[v]
-        least = LEAST_DISC * r
-        if s > r:
-            least *= (r / s) ** 2
-        growth += 0.5 * angle * min(s, r) ** 2
-        perimeter += angle * np.sqrt(max((r - s) * (r + s), least**2))
-    area = sections.neck + (1.0 - NARROWING * s / reach) * growth if reach > 0.0 else sections.neck
-    width = max(np.sqrt(area / (np.pi * sections.portion)), 2.0 * area / perimeter)
-    opening = sections.opening_factor * width
-    c1, c2 = sections.friction, sections.curvature
-    return (c1 * perimeter + 2.0 * c2 * area / sections.mean_radius) / (area * area * opening)
+    _set(points, 0, _HEIGHT, s)
+    _set(points, 0, _REACH, reach)
+    _set(points, 0, _WEIGHT, 1.0)
+    _weigh(False, sections, points)
+    return _get(points, 0, _WEIGHT)
 
 
 @helper(error_model="numpy")
-def _between(low, high, sections):
-    """Friction between two heights, 0 <= low < high.
+def _both_halves(low_a, high_a, low_b, high_b, sections, points):
+    """Friction between two heights, 0 <= low < high, in either half of a throat; nothing where low is not below high.
 
-    From the neck to the poles of the widest sphere in t, s = r t (3 - t²) / 2, where the perimeter has no root, and
-    points are as dense as the doubling height requires. Beyond in the logarithm of s.
+    From the neck to the poles of the widest sphere and beyond them, points are placed differently.
     """
     widest = sections.widest
-    if abs(high - widest) < 1e-9 * widest:  # lattices: t has a root there, which makes much of rounding
-        high = widest
-    total = 0.0
-    if high > widest:
-        begin = np.log(max(low / widest, 1.0))
-        end = np.log(high / widest)
-        for i in range(_NODES.shape[0]):
-            s = widest * np.exp(begin + (end - begin) * _NODES[i])
-            total += (end - begin) * _WEIGHTS[i] * s * _friction(s, high, sections)
-    if low >= widest:
-        return total
+    # Lattices: points to the poles have a root there, which makes much of rounding.
+    if abs(high_a - widest) < 1e-9 * widest:
+        high_a = widest
+    if abs(high_b - widest) < 1e-9 * widest:
+        high_b = widest
+    down = 0.0
+    up = 0.0
+    if min(low_a, low_b) < widest:
+        _list_to_poles(0, low_a, high_a, sections, points)
+        _list_to_poles(1, low_b, high_b, sections, points)
+        _weigh(True, sections, points)
+        down += _sum_of_half(0, points)
+        up += _sum_of_half(1, points)
+    if max(high_a, high_b) > widest:
+        _list_beyond_poles(0, low_a, high_a, sections, points)
+        _list_beyond_poles(1, low_b, high_b, sections, points)
+        _weigh(False, sections, points)
+        down += _sum_of_half(0, points)
+        up += _sum_of_half(1, points)
+    return down, up
+
+
+@helper(error_model="numpy")
+def _list_to_poles(half, low, high, sections, points):
+    """Points of a half between two heights, up to the poles of the widest sphere.
+
+    In t, s = r t (3 - t²) / 2, where the perimeter has no root; and in v = t / √(t² + e²), where points are as dense as
+    the doubling height requires. v, its differences and 1 - v are without cancellation: far from a narrow neck v is
+    nearly 1.
+    """
+    first = 0.0
+    span = 0.0
+    left = 1.0
+    if low < min(high, sections.widest):
+        e = sections.doubling_height / sections.widest
+        begin = _pole_part(low / sections.widest)
+        end = _pole_part(min(high / sections.widest, 1.0))
+        at_begin, at_end = np.hypot(begin, e), np.hypot(end, e)
+        first, last = begin / at_begin, end / at_end
+        span = (end - begin) * (end + begin) * (e / at_begin / at_end) ** 2 / (first + last)
+        left = e / at_begin * (e / (at_begin + begin))
+    for i in range(_POINTS):
+        lane = half * _POINTS + i
+        _set(points, lane, _V, first + span * _NODES[i])
+        _set(points, lane, _LEFT, left - span * _NODES[i])
+        _set(points, lane, _WEIGHT, span * _WEIGHTS[i])
+        _set(points, lane, _REACH, high if span > 0.0 else sections.widest)
+
+
+@helper
+def _pole_part(height):
+    """t of a height over the largest radius: t (3 - t²) / 2 is that."""
+    return 2.0 * np.sin(np.arcsin(height) / 3.0) if height > 0.0 else 0.0
+
+
+@helper(error_model="numpy", fastmath={"contract"})
+def _place_to_poles(lane, sections, points):
+    """Height and weight of a point that `_list_to_poles` has listed."""
+    widest = sections.widest
     e = sections.doubling_height / widest
-    begin = 2.0 * np.sin(np.arcsin(low / widest) / 3.0)
-    end = 2.0 * np.sin(np.arcsin(min(high / widest, 1.0)) / 3.0)
-    # v = t / √(t² + e²), its differences and 1 - v without cancellation: far from a narrow neck v is nearly 1.
-    at_begin, at_end = np.hypot(begin, e), np.hypot(end, e)
-    first, last = begin / at_begin, end / at_end
-    span = (end - begin) * (end + begin) * (e / at_begin / at_end) ** 2 / (first + last)
-    left = e / at_begin * (e / (at_begin + begin))
-    for i in range(_NODES.shape[0]):
-        v = first + span * _NODES[i]
-        root = np.sqrt((left - span * _NODES[i]) * (1.0 + v))
-        t = e * v / root
-        rate = 1.5 * widest * (1.0 - t * t) * e / root**3
-        s = 0.5 * widest * t * (3.0 - t * t)
-        total += span * _WEIGHTS[i] * rate * _friction(s, high, sections)
+    v = _get(points, lane, _V)
+    root = np.sqrt(_get(points, lane, _LEFT) * (1.0 + v))
+    t = e * v / root
+    rate = 1.5 * widest * (1.0 - t * t) * e / (root * root * root)
+    _set(points, lane, _HEIGHT, 0.5 * widest * t * (3.0 - t * t))
+    _set(points, lane, _WEIGHT, rate * _get(points, lane, _WEIGHT))
+
+
+@helper(error_model="numpy")
+def _list_beyond_poles(half, low, high, sections, points):
+    """Points of a half between two heights, as far as they are beyond the poles of the widest sphere: in log s."""
+    widest = sections.widest
+    begin = 0.0
+    span = 0.0
+    if high > max(low, widest):
+        begin = np.log(max(low / widest, 1.0))
+        span = np.log(high / widest) - begin
+    for i in range(_POINTS):
+        lane = half * _POINTS + i
+        s = widest * np.exp(begin + span * _NODES[i])
+        _set(points, lane, _HEIGHT, s)
+        _set(points, lane, _WEIGHT, span * _WEIGHTS[i] * s)
+        _set(points, lane, _REACH, high if span > 0.0 else s)
+
+
+@helper(error_model="numpy", fastmath={"contract"})
+def _weigh(to_poles, sections, points):
+    """Multiply the weight of each point by the resistance of a unit of length at its height.
+
+    `to_poles` says that points are as `_list_to_poles` lists them, and heights are still to be worked out.
+    With three discs, as but for ties, the loop has no other one in it, and is done in vectors. Products and sums are
+    fused where the processor can.
+    """
+    radii, angles = sections.radii, sections.angles
+    if radii.shape[0] == 3:
+        # Outside of the loop: there an array might be written to.
+        radius_a, radius_b, radius_c = radii[0], radii[1], radii[2]
+        angle_a, angle_b, angle_c = angles[0], angles[1], angles[2]
+        for lane in range(np.uint64(_LANES)):
+            if to_poles:
+                _place_to_poles(lane, sections, points)
+            s = _get(points, lane, _HEIGHT)
+            growth_a, arc_a = _disc(s, radius_a, angle_a)
+            growth_b, arc_b = _disc(s, radius_b, angle_b)
+            growth_c, arc_c = _disc(s, radius_c, angle_c)
+            _multiply_weight(lane, growth_a + growth_b + growth_c, arc_a + arc_b + arc_c, sections, points)
+        return
+    for lane in range(np.uint64(_LANES)):
+        if to_poles:
+            _place_to_poles(lane, sections, points)
+        growth = 0.0
+        arcs = 0.0
+        for v in range(radii.shape[0]):
+            more, arc = _disc(_get(points, lane, _HEIGHT), radii[v], angles[v])
+            growth += more
+            arcs += arc
+        _multiply_weight(lane, growth, arcs, sections, points)
+
+
+@helper(error_model="numpy", fastmath={"contract"})
+def _disc(s, r, angle):
+    """What a disc at height s has given to the section since the neck, and the arc that is wetted [m², m]."""
+    within = min(s, r)
+    part = r / max(s, r)
+    least = LEAST_DISC * r * part * part
+    return 0.5 * angle * within * within, angle * np.sqrt(max((r - s) * (r + s), least * least))
+
+
+@helper(error_model="numpy", fastmath={"contract"})
+def _multiply_weight(lane, growth, arcs, sections, points):
+    """Multiply the weight of a point by the resistance of its section."""
+    perimeter = sections.on_walls + arcs
+    reach = _get(points, lane, _REACH)
+    kept = 1.0 - NARROWING * _get(points, lane, _HEIGHT) / (reach if reach > 0.0 else 1.0)
+    area = sections.neck + (kept * growth if reach > 0.0 else 0.0)
+    width = max(np.sqrt(area / (np.pi * sections.portion)), 2.0 * area / perimeter)
+    friction = sections.friction * perimeter + 2.0 * sections.curvature / sections.mean_radius * area
+    resistance = friction / (area * area * (sections.opening_factor * width))
+    _set(points, lane, _WEIGHT, resistance * _get(points, lane, _WEIGHT))
+
+
+@helper
+def _sum_of_half(half, points):
+    total = 0.0
+    for i in range(_POINTS):
+        total += _get(points, half * _POINTS + i, _WEIGHT)
     return total
+
+
+@helper
+def _get(points, lane, field):
+    return points[np.uint64(field * _LANES) + np.uint64(lane)]
+
+
+@helper
+def _set(points, lane, field, value):
+    points[np.uint64(field * _LANES) + np.uint64(lane)] = value

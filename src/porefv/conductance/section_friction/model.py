@@ -50,7 +50,7 @@ class SectionFriction(ConductanceModel):
 
     def conductivity(self, throats: Throats, slip: np.ndarray) -> np.ndarray:
         """(t,): conductivity g of each throat [m⁴]; `slip` (6,) bool marks the walls of symmetry."""
-        return self._friction(throats, slip, np.arange(len(throats)))[0]
+        return self._friction(throats, slip, np.arange(len(throats)), beyond=False)[0]
 
     def drop_beyond_vertices(self, throats: Throats, slip: np.ndarray) -> DropBeyondVertices:
         """The part of each throat's drop that is lost between a pore's Laguerre vertex and its centre, if beyond."""
@@ -59,10 +59,12 @@ class SectionFriction(ConductanceModel):
         normals = throats.normals
         away = np.stack([-(moves[first] * normals).sum(1), (moves[second] * normals).sum(1)])
         which = np.flatnonzero((away > 0.0).any(axis=0))
-        return DropBeyondVertices(which, self._friction(throats, slip, which)[1])
+        return DropBeyondVertices(which, self._friction(throats, slip, which, beyond=True)[1])
 
-    def _friction(self, throats: Throats, slip: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of some throats (u,): conductivity (u,), and parts of the drop beyond the vertices (u, 2)."""
+    def _friction(
+        self, throats: Throats, slip: np.ndarray, which: np.ndarray, *, beyond: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Of some throats (u,): conductivity (u,), and parts of the drop beyond the vertices (u, 2) where asked for."""
         mesh = throats.mesh
         ends = Ends(mesh.local_vertices, throats.derived(centres_of_pores))
         necks = Necks(
@@ -71,7 +73,8 @@ class SectionFriction(ConductanceModel):
             throats.roundness(slip),
             throats.inscribed_circles(slip)[1],
         )
-        conductivity, beyond = np.empty(len(which)), np.empty((len(which), 2))
+        conductivity, parts = np.empty(len(which)), np.empty((len(which) if beyond else 0, 2))
+        radii = mesh.packing.radii
         for_rows(
             section_friction,
             len(which),
@@ -81,8 +84,8 @@ class SectionFriction(ConductanceModel):
             mesh.cell_vertices,
             ends,
             necks,
-            Drag(self.friction, self.curvature, np.asarray(slip, bool)),
+            Drag(float(self.friction), float(self.curvature), np.asarray(slip, bool), np.cbrt(radii) ** 2),
             conductivity,
-            beyond,
+            parts,
         )
-        return conductivity, beyond
+        return conductivity, parts
