@@ -11,13 +11,13 @@ from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class Circles(NamedTuple):
-    """A circle in the plane of each facet.
+    """A circle in the plane of each triple of vertices.
 
     Attributes
     ----------
-    radii : (f,) array
+    radii : (k,) array
         0 where there is no circle [m].
-    centres : (f, 3) array
+    centres : (k, 3) array
         From the local origin [m].
     """
 
@@ -25,134 +25,196 @@ class Circles(NamedTuple):
     centres: np.ndarray
 
 
-@kernel
-def inscribed_circles(first, last, facet_vertices, vertices, slip, radii, centres):
-    """Fill radii and centres of the circle in each facet's plane tangent to its spheres and no-slip walls (`Circles`).
+class TiedCircles(NamedTuple):
+    """The circles of throats that have several facets.
 
-    On walls with slip, (6,) bool, a circle is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that
-    of the circle, its tangency to the other two is linear in ρ and to the first quadratic.
+    Attributes
+    ----------
+    throats : (k,) int array
+        The throats, in their order.
+    radii, centres : (k,), (k, 3) arrays
+        As of `Circles`.
+    """
+
+    throats: np.ndarray
+    radii: np.ndarray
+    centres: np.ndarray
+
+
+@kernel
+def inscribed_circles(first, last, corners, vertices, slip, circles):
+    """Fill in the circles in the planes of triples of vertices, first ... last - 1.
 
     Parameters
     ----------
     first, last : int
         Rows to treat: first ... last - 1.
+    corners : (k, 3) int32 array
+        Vertices of each triple, a sphere first.
+    vertices : Vertices
+    slip : (6,) bool array
+        Walls of symmetry.
+    circles : Circles
+        To be filled in.
+    """
+    for i in unsigned_range(first, last):
+        radius, centre = _inscribed_circle(
+            _plane(corners[i, 0], corners[i, 1], corners[i, 2], vertices), vertices, slip
+        )
+        circles.radii[i] = radius
+        for axis in range(3):
+            circles.centres[i, axis] = centre[axis]
+
+
+@kernel
+def circles_of_throats(first, last, throats, facet_vertices, vertices, slip, tied, radii, portions):
+    """Fill in radius (t,) and portion (t,) of the inscribed circles of throats first ... last - 1.
+
+    The portion is the part of a circle's area that lies within the throat's facets; 0 for a radius of zero.
+
+    Parameters
+    ----------
+    first, last : int
+        Throats to treat: first ... last - 1.
+    throats : ThroatFacets
     facet_vertices : (f, 3) int32 array
         Vertices of each facet, spheres first.
     vertices : Vertices
     slip : (6,) bool array
         Walls of symmetry.
-    radii : (f,) float64 array
-        To fill; 0 where there is no circle [m].
-    centres : (f, 3) float64 array
-        To fill, from the local origin [m].
+    tied : TiedCircles
+    radii, portions : (t,) arrays
+        To be filled in [m, -].
     """
-    n, points, sizes = vertices
-    for f in unsigned_range(first, last):
-        a = facet_vertices[f, 0]
-        rows = np.empty((2, 2))
-        constant = np.empty(2)
-        slope = np.empty(2)
-        e1, e2 = _axes(f, facet_vertices, vertices)
-        for i in range(2):
-            m = facet_vertices[f, i + 1]
-            w = towards(a, m, vertices)
-            rows[i, 0] = dot(w, e1)
-            rows[i, 1] = dot(w, e2)
-            if m < n:
-                constant[i] = 0.5 * (dot(w, w) + (sizes[a] - sizes[m]) * (sizes[a] + sizes[m]))
-                slope[i] = sizes[a] - sizes[m]
-            else:
-                constant[i] = wall_distance(a, m, vertices)
-                slope[i] = 0.0 if slip[m - n] else -1.0
-        radii[f] = 0.0
-        det = rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0]
-        if det == 0.0:
-            continue
-        x0 = (constant[0] * rows[1, 1] - constant[1] * rows[0, 1]) / det
-        y0 = (constant[1] * rows[0, 0] - constant[0] * rows[1, 0]) / det
-        x1 = (slope[0] * rows[1, 1] - slope[1] * rows[0, 1]) / det
-        y1 = (slope[1] * rows[0, 0] - slope[0] * rows[1, 0]) / det
-        # |X₀ + ρ X₁| = r + ρ, as A ρ² + 2 B ρ + C = 0
-        r = sizes[a]
-        qa = x1 * x1 + y1 * y1 - 1.0
-        qb = x0 * x1 + y0 * y1 - r
-        qc = x0 * x0 + y0 * y0 - r * r
-        discriminant = qb * qb - qa * qc
-        if qc > 0.0 and discriminant >= 0.0:
-            below = np.sqrt(discriminant) - qb
-            if below > 0.0:
-                rho = qc / below
-                radii[f] = rho
-                for axis in range(3):
-                    centres[f, axis] = points[a, axis] + (x0 + rho * x1) * e1[axis] + (y0 + rho * y1) * e2[axis]
+    starts = throats.starts
+    place = 0  # of the next throat among those that are tied
+    while place < tied.throats.shape[0] and tied.throats[place] < first:
+        place += 1
+    for t in range(first, last):
+        count = starts[t + 1] - starts[t]
+        f = throats.facets[starts[t]]
+        plane = _plane(facet_vertices[f, 0], facet_vertices[f, 1], facet_vertices[f, 2], vertices)
+        if count == 1:
+            radius, centre = _inscribed_circle(plane, vertices, slip)
+        else:
+            radius, centre = tied.radii[place], vector_at(place, tied.centres)
+            place += 1
+        radii[t] = radius
+        portions[t] = 0.0
+        if radius > 0.0:
+            portions[t] = _portion(plane, radius, centre, vertices)
+            for j in range(starts[t] + 1, starts[t + 1]):
+                g = throats.facets[j]
+                plane = _plane(facet_vertices[g, 0], facet_vertices[g, 1], facet_vertices[g, 2], vertices)
+                portions[t] += _portion(plane, radius, centre, vertices)
 
 
-@kernel
-def circle_portions(first, last, facet_vertices, vertices, circles, portions):
-    """Fill `portions` (f,) with the part of each circle's area that lies within the facet; 0 for a radius of zero.
+class Plane(NamedTuple):
+    """Three vertices and their plane, as seen from the first, which is a sphere.
 
-    Parameters
+    Attributes
     ----------
-    first, last : int
-        Rows to treat: first ... last - 1.
-    facet_vertices : (f, 3) int32 array
-        Vertices of each facet, spheres first.
-    vertices : Vertices
-    circles : Circles
-    portions : (f,) float64 array
-        To fill.
+    a, b, c : int
+        Vertices.
+    ab, ac : vectors
+        From the centre of a to b and c; to a wall, its outward unit normal [m, -].
+    e1, e2 : vectors
+        Two unit vectors in the plane, at right angles in its sense [-].
     """
-    n = vertices.n_spheres
-    radii = circles.radii
-    for f in unsigned_range(first, last):
-        portions[f] = 0.0
-        if radii[f] <= 0.0:
-            continue
-        a = facet_vertices[f, 0]
-        b = facet_vertices[f, 1]
-        c = facet_vertices[f, 2]
-        e1, e2 = _axes(f, facet_vertices, vertices)
-        out = minus(vector_at(a, vertices.points), vector_at(f, circles.centres))
-        # From the circle's centre to the facet's corners, in radii.
-        corners = np.zeros((4, 2))
-        sides = 3 if c < n else 4
-        for i in range(sides):
-            corner = out
-            if i == 1 or (i == 2 and c >= n):
-                step = 1.0 if b < n else wall_distance(a, b, vertices)
-                corner = plus(corner, times(step, towards(a, b, vertices)))
-            if i == 2 and c >= n:
-                height = wall_distance(b if b < n else a, c, vertices)
-                corner = plus(corner, times(height, vector_at(c, vertices.points)))
-            elif i == 2:
-                corner = plus(corner, towards(a, c, vertices))
-            elif i == 3:
-                corner = plus(corner, times(wall_distance(a, c, vertices), vector_at(c, vertices.points)))
-            corners[i, 0] = dot(corner, e1) / radii[f]
-            corners[i, 1] = dot(corner, e2) / radii[f]
-        area = 0.0
-        apart = 0  # edges beyond the circle, all of them to the left
-        for i in range(sides):
-            j = (i + 1) % sides
-            u = corners[j, 0] - corners[i, 0]
-            v = corners[j, 1] - corners[i, 1]
-            if corners[i, 0] * v - corners[i, 1] * u >= np.sqrt(u * u + v * v) > 0.0:
-                apart += 1
-        if apart == sides:
-            portions[f] = 1.0
-            continue
-        for i in range(sides):
-            area += _within_circle(corners[i], corners[(i + 1) % sides])
-        portions[f] = abs(area) / np.pi
+
+    a: int
+    b: int
+    c: int
+    ab: tuple[float, float, float]
+    ac: tuple[float, float, float]
+    e1: tuple[float, float, float]
+    e2: tuple[float, float, float]
 
 
 @helper
-def _axes(f, facet_vertices, vertices):
-    """Two unit vectors in a facet's plane, at right angles in its sense."""
-    a = facet_vertices[f, 0]
-    u = towards(a, facet_vertices[f, 1], vertices)
-    normal = cross_product(u, towards(a, facet_vertices[f, 2], vertices))
-    return unit(u), unit(cross_product(normal, u))
+def _plane(a, b, c, vertices):
+    ab = towards(a, b, vertices)
+    ac = towards(a, c, vertices)
+    return Plane(a, b, c, ab, ac, unit(ab), unit(cross_product(cross_product(ab, ac), ab)))
+
+
+@helper
+def _inscribed_circle(plane, vertices, slip):
+    """Radius and centre of the circle in a plane tangent to its three vertices; a radius of 0 where there is none [m].
+
+    On walls with slip, (6,) bool, a circle is centred. With the first sphere's centre as origin and x = X₀ + ρ X₁ that
+    of the circle, its tangency to the other two is linear in ρ and to the first quadratic.
+    """
+    r = vertices.sizes[plane.a]
+    origin = vector_at(plane.a, vertices.points)
+    b_constant, b_slope = _tangency(plane.a, plane.b, plane.ab, vertices, slip)
+    c_constant, c_slope = _tangency(plane.a, plane.c, plane.ac, vertices, slip)
+    bx, by = dot(plane.ab, plane.e1), dot(plane.ab, plane.e2)
+    cx, cy = dot(plane.ac, plane.e1), dot(plane.ac, plane.e2)
+    det = bx * cy - by * cx
+    if det == 0.0:
+        return 0.0, origin
+    x0 = (b_constant * cy - c_constant * by) / det
+    y0 = (c_constant * bx - b_constant * cx) / det
+    x1 = (b_slope * cy - c_slope * by) / det
+    y1 = (c_slope * bx - b_slope * cx) / det
+    # |X₀ + ρ X₁| = r + ρ, as A ρ² + 2 B ρ + C = 0
+    qa = x1 * x1 + y1 * y1 - 1.0
+    qb = x0 * x1 + y0 * y1 - r
+    qc = x0 * x0 + y0 * y0 - r * r
+    discriminant = qb * qb - qa * qc
+    if not (qc > 0.0 and discriminant >= 0.0):
+        return 0.0, origin
+    below = np.sqrt(discriminant) - qb
+    if not below > 0.0:
+        return 0.0, origin
+    radius = qc / below
+    return radius, plus(origin, plus(times(x0 + radius * x1, plane.e1), times(y0 + radius * y1, plane.e2)))
+
+
+@helper
+def _tangency(a, m, towards_m, vertices, slip):
+    """Constant and slope in ρ of (x - x_a)·(x_m - x_a), for a circle that is tangent to spheres a and m."""
+    n, sizes = vertices.n_spheres, vertices.sizes
+    if m >= n:
+        return wall_distance(a, m, vertices), 0.0 if slip[m - n] else -1.0
+    difference = sizes[a] - sizes[m]
+    return 0.5 * (dot(towards_m, towards_m) + difference * (sizes[a] + sizes[m])), difference
+
+
+@helper
+def _portion(plane, radius, centre, vertices):
+    """Part of a circle's area that lies within a facet."""
+    a, b, c, ab, ac, _, _ = plane
+    n = vertices.n_spheres
+    # From the circle's centre to the facet's corners, in radii: three, or four on walls.
+    at_a = minus(vector_at(a, vertices.points), centre)
+    at_b = plus(at_a, times(1.0 if b < n else wall_distance(a, b, vertices), ab))
+    p = _in_plane(at_a, plane, radius)
+    q = _in_plane(at_b, plane, radius)
+    if c < n:
+        s = _in_plane(plus(at_a, ac), plane, radius)
+        if _beyond(p, q) and _beyond(q, s) and _beyond(s, p):
+            return 1.0
+        return abs(_within_circle(p, q) + _within_circle(q, s) + _within_circle(s, p)) / np.pi
+    s = _in_plane(plus(at_b, times(wall_distance(b if b < n else a, c, vertices), ac)), plane, radius)
+    u = _in_plane(plus(at_a, times(wall_distance(a, c, vertices), ac)), plane, radius)
+    if _beyond(p, q) and _beyond(q, s) and _beyond(s, u) and _beyond(u, p):
+        return 1.0
+    return abs(_within_circle(p, q) + _within_circle(q, s) + _within_circle(s, u) + _within_circle(u, p)) / np.pi
+
+
+@helper
+def _in_plane(corner, plane, radius):
+    return dot(corner, plane.e1) / radius, dot(corner, plane.e2) / radius
+
+
+@helper
+def _beyond(p, q):
+    """Whether an edge lies beyond the unit circle, to the left."""
+    u = q[0] - p[0]
+    v = q[1] - p[1]
+    return p[0] * v - p[1] * u >= np.sqrt(u * u + v * v) > 0.0
 
 
 @helper

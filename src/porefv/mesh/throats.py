@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from porefv.mesh.facet_kernels import row_sums
-from porefv.mesh.inscribed_circles import Circles, circle_portions, inscribed_circles
+from porefv.mesh.inscribed_circles import Circles, TiedCircles, circles_of_throats, inscribed_circles
 from porefv.mesh.uniting import tied_facets
 from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.system.threads import for_rows
@@ -210,19 +210,13 @@ class Throats(FixedInputs):
         if slip.tobytes() in self._inscribed:
             return self._inscribed[slip.tobytes()]
         mesh = self.mesh
-        radii, centres = self._circles(mesh.facets.vertices[self.first_facets], slip)
-        throat, corners = self._tied_corner_triples
-        if len(throat):
-            found, places = self._circles(corners, slip)
-            order = np.lexsort((np.where(found > 0.0, found, np.inf), throat))
-            tied, first = np.unique(throat[order], return_index=True)
-            radii[tied], centres[tied] = found[order][first], places[order][first]
-        portions = np.zeros(len(mesh.facets.vertices))
-        of_throat = self.facet_throat  # -1, the row appended below, within a pore
-        circles = Circles(np.append(radii, 0.0)[of_throat], np.append(centres, np.zeros((1, 3)), axis=0)[of_throat])
-        for_rows(circle_portions, len(portions), mesh.facets.vertices, mesh.cell_vertices, circles, portions)
+        radii, portions = np.empty((2, len(self)))
+        for_rows(
+            circles_of_throats, len(self), self.facets_of_throats, mesh.facets.vertices, mesh.cell_vertices, slip,
+            self._tied_circles(slip), radii, portions,
+        )  # fmt: skip
         whole = 1.0 / self.mirror_images(slip)
-        portions = np.where(radii > 0.0, np.clip(self._total(portions), 0.05 * whole, whole), whole)
+        portions = np.where(radii > 0.0, np.clip(portions, 0.05 * whole, whole), whole)
         return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
 
     def roundness(self, slip: np.ndarray) -> np.ndarray:
@@ -238,10 +232,14 @@ class Throats(FixedInputs):
             np.divide(radii, np.sqrt(areas / (np.pi * portions)), out=np.ones(len(self)), where=known), 1.0
         )
 
-    def _circles(self, vertices: np.ndarray, slip: np.ndarray) -> Circles:
-        found = Circles(np.empty(len(vertices)), np.zeros((len(vertices), 3)))
-        for_rows(inscribed_circles, len(vertices), vertices, self.mesh.cell_vertices, slip, *found)
-        return found
+    def _tied_circles(self, slip: np.ndarray) -> TiedCircles:
+        """Circles of the throats that a tie has cut: of each the least that three of its vertices have."""
+        throat, corners = self._tied_corner_triples
+        found = Circles(np.empty(len(corners)), np.empty((len(corners), 3)))
+        for_rows(inscribed_circles, len(corners), corners, self.mesh.cell_vertices, slip, found)
+        order = np.lexsort((np.where(found.radii > 0.0, found.radii, np.inf), throat))
+        tied, first = np.unique(throat[order], return_index=True)
+        return TiedCircles(tied, found.radii[order][first], found.centres[order][first])
 
     @lazy_property
     def _tied_corner_triples(self) -> tuple[np.ndarray, np.ndarray]:
