@@ -25,6 +25,9 @@ def four(monkeypatch):
     monkeypatch.setattr(threads, "_quota", lambda: sys.maxsize)
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
+    threads._lasting_limit.cache_clear()
+    yield
+    threads._lasting_limit.cache_clear()
 
 
 # ---- how many ----------
@@ -41,6 +44,7 @@ def four(monkeypatch):
 def test_the_least_of_all_limits_counts(four, monkeypatch, variables, expected):
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
+    threads._lasting_limit.cache_clear()
     assert thread_count() == expected
     with limited_threads(2):
         assert thread_count() == min(2, expected)

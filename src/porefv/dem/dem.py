@@ -250,7 +250,7 @@ class DEM:
         self.halfway = False
         applied = self.state.applied + forces
         self._advance(MOTION, 1, applied, np.asarray(thrusts, float))
-        self.state.applied_work += self.step * float(np.vdot(applied, self.state.grains.motion[:, 4:7]))
+        self.state.applied_work += self.step * float((applied * self.state.grains.motion[:, 4:7]).sum())
 
     def _advance(self, half: int, steps: int, applied: np.ndarray, thrusts: np.ndarray) -> int:
         """Take steps until pairs must be listed anew; returns how many."""

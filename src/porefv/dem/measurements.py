@@ -112,7 +112,7 @@ class Energies:
             if ratio > 0.0:
                 tangential = ratio * pairs.stiffness
                 elastic += 0.5 * float(((pairs.shear**2).sum(axis=1) / tangential)[overlaps > 0.0].sum())
-        potential = -float(((motion[:, :3] @ gravity) / inverse_mass).sum())
+        potential = -float(((motion[:, :3] * gravity).sum(axis=1) / inverse_mass).sum())
         sliding, walls, damped = state.work
         return cls(float(kinetic), elastic, potential, sliding, damped, walls, state.applied_work)
 

@@ -141,7 +141,7 @@ def grain_forces(
     thrust = np.zeros(3)
     for wall, (axis, sense, held) in enumerate(zip(WALL_AXES, WALL_SENSES, walls.held, strict=True)):
         on_wall = faces.walls == wall
-        force = sense * np.dot(face_pressure[on_wall], faces.areas[on_wall])
+        force = sense * (face_pressure[on_wall] * faces.areas[on_wall]).sum()
         if held:
             thrust[axis] -= force
         else:

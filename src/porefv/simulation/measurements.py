@@ -69,7 +69,7 @@ def fluid_row(coupling: Coupling, dem: DEM) -> dict[str, float]:
     row: dict[str, float] = {f"fluid_force_{wall}": force for wall, force in zip(WALLS, thrusts, strict=True)}
     row |= {f"total_stress_{wall}": stress for wall, stress in total.items()}
     row |= {f"flux_{wall}": flux for wall, flux in fluxes.items()}
-    row |= {"mean_pressure": float(np.dot(pressure, volumes) / volumes.sum()), "max_pressure": float(pressure.max())}
+    row |= {"mean_pressure": float((pressure * volumes).sum() / volumes.sum()), "max_pressure": float(pressure.max())}
     row |= {f"power_{name}": value for name, value in asdict(power).items()}
     row |= {"power_imbalance": power.imbalance}
     return row | {"iterations": coupling.effort.iterations, "meshes": coupling.effort.meshes}
@@ -97,7 +97,7 @@ def _thrusts(coupling: Coupling) -> np.ndarray:
 
 def momentum(dem: DEM) -> np.ndarray:
     """(3,): Σ m v half a step ago [kg m/s]."""
-    return dem.masses @ dem.velocities
+    return (dem.masses[:, None] * dem.velocities).sum(axis=0)
 
 
 def momentum_residual(dem: DEM, coupling: Coupling | None, before: np.ndarray) -> float:

@@ -35,7 +35,7 @@ from porefv.solvers.substitution import (
 from porefv.system.threads import for_each, for_rows
 
 # Nodes from which two parts pay, and the size beyond which there are more of them.
-_CUT_FROM = 20_000
+_CUT_FROM = 50_000
 _PART = 400_000
 
 

@@ -38,7 +38,7 @@ class SparseFactor:
         """z = A⁻¹ r but for rounding; returns r·z. The same as `ApproximateCholesky.apply`."""
         np.multiply(self.scale, r, out=y)
         np.multiply(self.scale, self.factor.solve(y), out=z)
-        return float(r @ z)
+        return float((r * z).sum())
 
 
 class DirectFactor(SparseFactor):

@@ -36,8 +36,8 @@ def thread_count() -> int:
     The least of the processors that the process may use, of the quota of its control groups (a container, a batch
     job), of the variables OMP_NUM_THREADS and NUMBA_NUM_THREADS, and of what `limit_threads` was given.
     """
-    counts = [_processors(), _quota(), *_variables()]
-    return max(1, min(counts if _limit is None else [*counts, _limit]))
+    allowed = min(_processors(), _lasting_limit())
+    return max(1, allowed if _limit is None else min(allowed, _limit))
 
 
 def limit_threads(count: int | None) -> None:
@@ -136,6 +136,12 @@ def _processors() -> int:
         return os.cpu_count() or 1
 
 
+@cache
+def _lasting_limit() -> int:
+    """What the quota and the variables of the process allow, looked at once: it takes longer than handing work over."""
+    return min(_quota(), *_variables(), sys.maxsize)
+
+
 def _variables() -> Iterator[int]:
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         # OpenMP allows a list, one number for each level of nesting.
@@ -145,7 +151,6 @@ def _variables() -> Iterator[int]:
                 yield count
 
 
-@cache
 def _quota(root: Path = Path("/")) -> int:
     """Processors' worth of time that the least quota of a control group grants; `sys.maxsize` without one.
 
