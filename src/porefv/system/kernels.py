@@ -54,10 +54,13 @@ def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     ----------
     function : callable
     **options
-        Of numba: `error_model`, `fastmath`, `inline`.
+        Of numba: `error_model`, `fastmath`, `inline`, `forceinline`. LLVM puts it in place of each call, by default:
+        many arguments, as of named tuples of arrays, take longer to hand over than a formula to work out. What is long
+        and seldom called, as exact arithmetic, compiles quicker with `forceinline=False`.
     """
     if function is None:
         return lambda function: helper(function, **options)
+    options.setdefault("forceinline", "inline" not in options)
     return _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 

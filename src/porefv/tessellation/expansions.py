@@ -18,7 +18,7 @@ from porefv.system.kernels import helper
 _SPLITTER = 134217729.0  # 2**27 + 1 cuts a double in two halves of 26 bits
 
 
-@helper
+@helper(forceinline=False)
 def two_sum(a, b):
     """The sum a + b as (rounded, error), exactly."""
     x = a + b
@@ -26,7 +26,7 @@ def two_sum(a, b):
     return x, (a - (x - bv)) + (b - bv)
 
 
-@helper
+@helper(forceinline=False)
 def two_product(a, b):
     """The product a b as (rounded, error), exactly."""
     x = a * b
@@ -39,7 +39,7 @@ def two_product(a, b):
     return x, a_low * b_low - (((x - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@helper
+@helper(forceinline=False)
 def add(e, ne, f, nf, h):
     """Sum of two expansions into `h` (room for ne + nf; neither input may share memory with it).
 
@@ -79,7 +79,7 @@ def add(e, ne, f, nf, h):
     return n
 
 
-@helper
+@helper(forceinline=False)
 def scale(e, ne, b, h):
     """Product of an expansion and a double into `h` (room for 2 ne).
 
@@ -116,7 +116,7 @@ def scale(e, ne, b, h):
     return n
 
 
-@helper
+@helper(forceinline=False)
 def multiply(e, ne, f, nf, h):
     """Product of two expansions into `h` (room for 2 ne nf).
 
@@ -146,7 +146,7 @@ def multiply(e, ne, f, nf, h):
     return n
 
 
-@helper
+@helper(forceinline=False)
 def estimate(e, ne):
     """The double nearest to an expansion, to within a rounding or two."""
     value = 0.0
@@ -155,7 +155,7 @@ def estimate(e, ne):
     return value
 
 
-@helper
+@helper(forceinline=False)
 def sign(e, ne):
     """-1, 0 or 1: the sign of an expansion is that of its largest component."""
     if ne == 0:

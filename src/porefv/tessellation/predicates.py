@@ -66,7 +66,7 @@ def row(v, q, vertices):
     return (x, y, z), 2.0 * (weights[v] - along), 2.0 * (abs(weights[v]) + abs(along))
 
 
-@helper
+@helper(forceinline=False)
 def side(cell, i, q, vertices):
     """Sign of C_i: positive where q lies on the cell's own side of the facet opposite to its vertex i.
 
@@ -94,7 +94,7 @@ def side(cell, i, q, vertices):
     return -s if i % 2 == 0 else s
 
 
-@helper
+@helper(forceinline=False)
 def in_conflict(cell, q, vertices):
     """Whether the sphere q lies closer, in power, to the cell's power centre than the cell's own vertices."""
     a0, h0, t0 = row(cell[0], q, vertices)
@@ -114,7 +114,7 @@ def in_conflict(cell, q, vertices):
     return s > 0
 
 
-@helper
+@helper(forceinline=False)
 def power_centre(cell, q, vertices):
     """Power centre of a cell relative to its sphere q, correctly rounded from exact determinants."""
     centre = np.empty(3)
@@ -161,7 +161,7 @@ def _others(i):
     return 0, 1, 2
 
 
-@helper
+@helper(forceinline=False)
 def _exact_rows(cell, q, vertices):
     """The rows a_k as (4, 3, 2): each entry the exact sum of a small and a large double."""
     n, points, _ = vertices
@@ -178,7 +178,7 @@ def _exact_rows(cell, q, vertices):
     return rows
 
 
-@helper
+@helper(forceinline=False)
 def _entry(low, high, out):
     """The expansion low + high."""
     n = 0
@@ -191,7 +191,7 @@ def _entry(low, high, out):
     return n
 
 
-@helper
+@helper(forceinline=False)
 def _exact_minor2(rows, j, k, u, v, out):
     """rows[j, u] rows[k, v] - rows[j, v] rows[k, u] (at most 16 components)."""
     x = np.empty(2)
@@ -209,7 +209,7 @@ def _exact_minor2(rows, j, k, u, v, out):
     return add(left, nl, right, nr, out)
 
 
-@helper
+@helper(forceinline=False)
 def _exact_minor(rows, j, k, m, out):
     """det of the rows j, k, m (at most 192 components)."""
     x = np.empty(2)
@@ -227,7 +227,7 @@ def _exact_minor(rows, j, k, m, out):
     return count
 
 
-@helper
+@helper(forceinline=False)
 def _exact_height(v, q, rows, k, vertices, out):
     """H_k of vertex v in row k (at most 24 components)."""
     n, points, weights = vertices
@@ -264,7 +264,7 @@ def _exact_height(v, q, rows, k, vertices, out):
     return count
 
 
-@helper
+@helper(forceinline=False)
 def _exact_conflict(cell, q, vertices):
     """Sign of Δ in exact arithmetic."""
     rows = _exact_rows(cell, q, vertices)
@@ -288,7 +288,7 @@ def _exact_conflict(cell, q, vertices):
     return sign(total, add(left, nl, right, nr, total))
 
 
-@helper
+@helper(forceinline=False)
 def _precedes(u, v, points):
     """Whether vertex u comes before v in lexicographic order of the points (n + 6, 3)."""
     for axis in range(3):
@@ -297,7 +297,7 @@ def _precedes(u, v, points):
     return u < v
 
 
-@helper
+@helper(forceinline=False)
 def _perturbed_conflict(cell, q, vertices):
     """Sign of Δ when its exact value is zero: that of the first non-zero derivative by a perturbed weight.
 
