@@ -176,7 +176,7 @@ def test_repeated_solutions_are_equal_to_the_bit(solver):
 
 def test_solutions_do_not_depend_on_the_number_of_threads(monkeypatch):
     monkeypatch.setattr(threads, "_processors", lambda: 3)
-    network, rhs = grid_network(28, 6)  # large enough to be cut into parts
+    network, rhs = grid_network(38, 6)  # large enough to be cut into parts
     with threads.limited_threads(1):
         one, _ = solve(network, rhs, "cg")
     assert_array_equal(one, solve(network, rhs, "cg")[0])
@@ -184,7 +184,7 @@ def test_solutions_do_not_depend_on_the_number_of_threads(monkeypatch):
 
 @pytest.mark.parametrize("order", ["along the grid", "at random"])
 def test_networks_cut_into_parts_are_solved_as_any_other(order):
-    m = 28
+    m = 38
     rng = np.random.default_rng(1)
     pairs = grid_links(m)
     if order == "at random":  # nearly every node is then linked to a later part

@@ -27,6 +27,7 @@ from porefv.solvers.substitution import (
     FactorRows,
     backward,
     forward,
+    part_entries_first,
     rows_from,
     substitute,
     substitute_separator,
@@ -89,9 +90,9 @@ class ApproximateCholesky:
         )
         rows = np.concatenate([position[piece.nodes[piece.factor.rows]] for piece in pieces])
         factors = np.concatenate([piece.factor.factors for piece in pieces])
-        columns = FactorColumns(
-            order.astype(np.uint32), starts.astype(np.uint32), rows.astype(np.uint32), factors, 1.0 / pivots
-        )
+        starts, rows, part_ends = starts.astype(np.uint32), rows.astype(np.uint32), np.empty(n, np.uint32)
+        part_entries_first(starts, rows, factors, parts[-1] if n_parts > 1 else n, part_ends)
+        columns = FactorColumns(order.astype(np.uint32), starts, rows, factors, part_ends, 1.0 / pivots)
         return cls(parts, columns, rows_from(columns, parts[-1]))
 
     def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
@@ -100,7 +101,7 @@ class ApproximateCholesky:
         if len(self.parts) == 2:
             return substitute(columns, r, z, y)
         parts = list(pairwise(self.parts.tolist()))
-        for_each(lambda part: forward(*part, columns, inner, r, y), parts)
+        for_each(lambda part: forward(*part, columns, r, y), parts)
         for_rows(sum_separator_rows, len(y) - inner, columns, self.separator_rows, inner, r, y, least=4096)
         product = substitute_separator(columns, inner, r, z, y)
         return product + sum(for_each(lambda part: backward(*part, columns, r, z, y), parts))

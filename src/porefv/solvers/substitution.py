@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from porefv.system.kernels import helper, kernel
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class FactorColumns(NamedTuple):
@@ -18,6 +18,8 @@ class FactorColumns(NamedTuple):
         Node at each position.
     starts : (n + 1,) uint32, rows : (fill,) uint32, factors : (fill,) float32 arrays
         Column k of -L below its unit diagonal has the entries starts[k] ... starts[k + 1] - 1 of `factors`, in `rows`.
+    part_ends : (n,) uint32 array
+        Where the entries of column k in rows of its own part end; those in rows of the separator follow.
     inverse_pivots : (n,) array
         1 / D [Pa s/m³].
     """
@@ -26,6 +28,7 @@ class FactorColumns(NamedTuple):
     starts: np.ndarray
     rows: np.ndarray
     factors: np.ndarray
+    part_ends: np.ndarray
     inverse_pivots: np.ndarray
 
 
@@ -40,6 +43,23 @@ class FactorRows(NamedTuple):
     starts: np.ndarray
     columns: np.ndarray
     factors: np.ndarray
+
+
+@kernel
+def part_entries_first(starts, rows, factors, n_inner, part_ends):
+    """Put the entries of each column in rows before n_inner before the others, and fill in where they end."""
+    for k in range(part_ends.shape[0]):
+        end = np.int64(starts[k])
+        for e in range(np.int64(starts[k]), np.int64(starts[k + 1])):
+            if rows[e] < n_inner:
+                row, factor = rows[e], factors[e]
+                for i in range(e, end, -1):
+                    rows[i] = rows[i - 1]
+                    factors[i] = factors[i - 1]
+                rows[end] = row
+                factors[end] = factor
+                end += 1
+        part_ends[k] = end
 
 
 @kernel
@@ -79,7 +99,7 @@ def substitute(factor, r, z, y):
     z, y : (n,) float64 arrays
         To fill: the result, and what lies between the two substitutions.
     """
-    order, starts, rows, factors, _ = factor
+    order, starts, rows, factors, _, _ = factor
     n = order.shape[0]
     for k in range(n):
         y[k] = r[order[k]]
@@ -91,7 +111,7 @@ def substitute(factor, r, z, y):
 
 
 @kernel
-def forward(first, last, factor, n_inner, r, y):
+def forward(first, last, factor, r, y):
     """y = L⁻¹ r within one part.
 
     Parameters
@@ -99,21 +119,18 @@ def forward(first, last, factor, n_inner, r, y):
     first, last : int
         The part has the positions first ... last - 1.
     factor : FactorColumns
-    n_inner : int
-        Position where the separator starts; its nodes wait for all the parts.
     r : (n,) float64 array
         Right-hand side.
     y : (n,) float64 array
         To fill.
     """
-    order, starts, rows, factors, _ = factor
-    for k in range(first, last):
+    order, starts, rows, factors, part_ends, _ = factor
+    for k in unsigned_range(first, last):
         y[k] = r[order[k]]
-    for k in range(first, last):
+    for k in unsigned_range(first, last):
         v = y[k]
-        for e in range(starts[k], starts[k + 1]):
-            if rows[e] < n_inner:
-                y[rows[e]] += factors[e] * v
+        for e in range(starts[k], part_ends[k]):
+            y[rows[e]] += factors[e] * v
 
 
 @kernel
@@ -144,7 +161,7 @@ def sum_separator_rows(first, last, factor, separator_rows, n_inner, r, y):
 @kernel(error_model="numpy")
 def substitute_separator(factor, n_inner, r, z, y):
     """Both substitutions within the separator, from position n_inner on; returns its part of r·z."""
-    _, starts, rows, factors, _ = factor
+    _, starts, rows, factors, _, _ = factor
     n = y.shape[0]
     for k in range(n_inner, n):
         v = y[k]
@@ -162,7 +179,7 @@ def backward(first, last, factor, r, z, y):
 @helper(error_model="numpy")
 def _backward(first, last, factor, r, z, y):
     """y and z = L⁻ᵀ D⁻¹ y for positions first ... last - 1; returns their part of r·z."""
-    order, starts, rows, factors, inverse_pivots = factor
+    order, starts, rows, factors, _, inverse_pivots = factor
     product = 0.0
     for k in range(last - 1, first - 1, -1):
         s = y[k] * inverse_pivots[k]
