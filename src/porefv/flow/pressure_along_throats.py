@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.conductance.section_friction.friction_kernels import STRETCH
-from porefv.mesh.vectors import cross_product, dot, minus, towards, vector_at
+from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, vector_at
 from porefv.system.kernels import helper, kernel
 
 # Points on each triangle, towards its pore's vertex and across: 3 % of what they move, in the mean square.
@@ -65,11 +65,12 @@ class Patches(NamedTuple):
 
 # Eight numbers are two vectors of AVX2, or one of AVX-512.
 _LANES = 8
-# So many groups, 70 kB, are integrated at a time.
-_GROUPS = 64
-# Places in `Patches.fields`: vectors from the sphere's centre to its two neighbours in the neck and to the pore's
-# Laguerre vertex, the facet's normal, the sphere's radius, β / e, Φ at the vertex, the part of the drop on that side.
-_A, _B, _C, _NORMAL, _RADIUS, _SCALE, _END, _DROP, _FIELDS = 0, 3, 6, 9, 12, 13, 14, 15, 16
+# So many groups, 40 kB, are integrated at a time.
+_GROUPS = 32
+# Places in `Patches.fields`: vectors from the sphere's centre to its two neighbours in the neck, its radius; and on
+# either side, three places apart or one, the vector to the pore's Laguerre vertex, the height of that over the neck
+# times β / e, Φ there, and the part of the throat's pressure drop.
+_A, _B, _RADIUS, _C, _TOP, _END, _DROP, _FIELDS = 0, 3, 6, 7, 13, 15, 17, 19
 
 
 @kernel(error_model="numpy")
@@ -97,7 +98,7 @@ def apply_pressure_along_throats(
     most = 0
     for t in range(begin + first, begin + last):
         most = max(most, throats.starts[t + 1] - throats.starts[t])
-    groups = _GROUPS + 1 + 6 * most // _LANES
+    groups = _GROUPS + 1 + 3 * most // _LANES
     room = groups * _LANES
     # Lanes that are not filled hold ones.
     patches = Patches(np.ones(room * _FIELDS), np.empty(room), np.empty(room, np.int64), np.empty(room, np.int64))
@@ -132,14 +133,15 @@ def _list_patches(t, count, begin, throats, facets, vertices, laguerre_vertices,
     height = drops.doubling_heights[f]
     if not height > 0.0:
         return count
-    scale = STRETCH / height
     normal = vector_at(f, facets.normals)
     origin = vector_at(facets.vertices[f, 0], vertices.points)
-    # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
     pi = vector_at(facets.cells[f, 0], laguerre_vertices)
     pj = vector_at(facets.cells[f, 1], laguerre_vertices)
-    low = min(_fall(scale * dot(minus(pi, origin), normal), 1.0), 0.0)
-    high = max(_fall(scale * dot(minus(pj, origin), normal), 1.0), 0.0)
+    # The vertex of a pore beyond the facet's plane leaves no part of the throat to that pore.
+    top_i = STRETCH / height * dot(minus(pi, origin), normal)
+    top_j = STRETCH / height * dot(minus(pj, origin), normal)
+    low = min(_fall(top_i, 1.0), 0.0)
+    high = max(_fall(top_j, 1.0), 0.0)
     if not high - low > 0.0:
         return count
     row = start - throats.starts[begin]
@@ -158,23 +160,16 @@ def _list_patches(t, count, begin, throats, facets, vertices, laguerre_vertices,
             a = towards(k, after, vertices)
             b = towards(k, before, vertices)
             centre = vector_at(k, vertices.points)
-            for side in range(2):
-                end = high if side == 1 else low
-                drop = abs(end) / (high - low)
-                if drop > 0.0:
-                    patches.rows[count] = row + j
-                    patches.places[count] = v
-                    patches.senses[count] = sense
-                    lane = _lane(count)
-                    _set_vector(patches.fields, lane, _A, a)
-                    _set_vector(patches.fields, lane, _B, b)
-                    _set_vector(patches.fields, lane, _C, minus(pj if side == 1 else pi, centre))
-                    _set_vector(patches.fields, lane, _NORMAL, normal)
-                    _set(patches.fields, lane, _RADIUS, vertices.sizes[k])
-                    _set(patches.fields, lane, _SCALE, scale)
-                    _set(patches.fields, lane, _END, end)
-                    _set(patches.fields, lane, _DROP, drop)
-                    count += 1
+            patches.rows[count] = row + j
+            patches.places[count] = v
+            patches.senses[count] = sense
+            lane = _lane(count)
+            _set_vector(patches.fields, lane, _A, a)
+            _set_vector(patches.fields, lane, _B, b)
+            _set(patches.fields, lane, _RADIUS, vertices.sizes[k])
+            _set_side(patches.fields, lane, 0, minus(pi, centre), top_i, low, -low / (high - low))
+            _set_side(patches.fields, lane, 1, minus(pj, centre), top_j, high, high / (high - low))
+            count += 1
     return count
 
 
@@ -328,13 +323,18 @@ def _fall(x, square):
     return t - t * t * t / 3.0
 
 
+@helper
+def _set_side(fields, lane, side, c, top, end, drop):
+    """What is known of one side; without a drop there, numbers that leave none."""
+    _set_vector(fields, lane, _C + 3 * side, c)
+    _set(fields, lane, _TOP + side, top if drop > 0.0 else 0.0)
+    _set(fields, lane, _END + side, end if drop > 0.0 else 1.0)
+    _set(fields, lane, _DROP + side, drop)
+
+
 @helper(error_model="numpy", fastmath={"contract"})
 def _integrate(group, fields):
-    """Force on the patches of a group by the pressure's fall between a pore's Laguerre vertex and the neck.
-
-    A patch spans between three unit vectors from the sphere's centre: a and b in the neck, c to the vertex. There is
-    none where points on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a
-    facet's corner of nearly 180° with the vertex opposite in its plane.
+    """Force on the patches of a group by the pressure's fall between the pores' Laguerre vertices and the neck.
 
     All patches of the group do the same, for the loop over them to be done in vectors: the loops over points are
     unrolled. Products and sums are fused where the processor can.
@@ -344,36 +344,52 @@ def _integrate(group, fields):
         lane = begin + i
         a = _direction(_get_vector(fields, lane, _A))
         b = _direction(_get_vector(fields, lane, _B))
-        c = _direction(_get_vector(fields, lane, _C))
+        normal = cross_product(a, b)
         radius = _get(fields, lane, _RADIUS)
-        # Over e / β, times the point's distance.
-        top = _get(fields, lane, _SCALE) * radius * dot(c, _get_vector(fields, lane, _NORMAL))
-        inverse_end = 1.0 / _get(fields, lane, _END)
-        # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
-        volume = dot(cross_product(a, b), c)
-        seen = 0.0
-        x = 0.0
-        y = 0.0
-        z = 0.0
-        for p in range(2):
-            wc = _NODES[p]
-            for q in range(3):
-                wb = (1.0 - wc) * _ACROSS[q]
-                wa = 1.0 - wc - wb
-                u = wa * a[0] + wb * b[0] + wc * c[0]
-                v = wa * a[1] + wb * b[1] + wc * c[1]
-                w = wa * a[2] + wb * b[2] + wc * c[2]
-                far = u * u + v * v + w * w
-                left = min(max(1.0 - _fall(top * wc, far) * inverse_end, 0.0), 1.0)
-                # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
-                solid = (_WEIGHTS[p] * _ACROSS_WEIGHTS[q] * (1.0 - wc)) * volume / (far * far)
-                seen += abs(solid) * np.sqrt(far)
-                weight = left * solid
-                x += weight * u
-                y += weight * v
-                z += weight * w
-        factor = -_get(fields, lane, _DROP) * radius * radius if seen <= 2.0 * np.pi else 0.0
-        _set_vector(fields, lane, 0, (factor * x, factor * y, factor * z))
+        on_i = _patch(a, b, normal, radius, lane, 0, fields)
+        on_j = _patch(a, b, normal, radius, lane, 1, fields)
+        _set_vector(fields, lane, 0, plus(on_i, on_j))
+
+
+@helper(error_model="numpy", fastmath={"contract"})
+def _patch(a, b, normal, radius, lane, side, fields):
+    """Force on a sphere's patch on one side of the neck.
+
+    The patch spans between three unit vectors from the sphere's centre: a and b in the neck, c to the vertex. There is
+    none where points on the flat triangle come next to the sphere's centre, and would see more of it than a half: in a
+    facet's corner of nearly 180° with the vertex opposite in its plane.
+    """
+    to_vertex = _get_vector(fields, lane, _C + 3 * side)
+    square = dot(to_vertex, to_vertex)
+    inverse = 1.0 / np.sqrt(square if square > 0.0 else 1.0)
+    c = times(inverse, to_vertex)
+    top = radius * inverse * _get(fields, lane, _TOP + side)  # of c, over e / β
+    inverse_end = 1.0 / _get(fields, lane, _END + side)
+    # Positive along the facet's normal, where pressure is lower than at the neck, negative on the other side of it.
+    volume = dot(normal, c)
+    seen = 0.0
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    for p in range(2):
+        wc = _NODES[p]
+        for q in range(3):
+            wb = (1.0 - wc) * _ACROSS[q]
+            wa = 1.0 - wc - wb
+            u = wa * a[0] + wb * b[0] + wc * c[0]
+            v = wa * a[1] + wb * b[1] + wc * c[1]
+            w = wa * a[2] + wb * b[2] + wc * c[2]
+            far = u * u + v * v + w * w
+            left = min(max(1.0 - _fall(top * wc, far) * inverse_end, 0.0), 1.0)
+            # dA of a point of the flat triangle abc, seen from the centre: volume / distance³; and its unit vector.
+            solid = (_WEIGHTS[p] * _ACROSS_WEIGHTS[q] * (1.0 - wc)) * volume / (far * far)
+            seen += abs(solid) * np.sqrt(far)
+            weight = left * solid
+            x += weight * u
+            y += weight * v
+            z += weight * w
+    factor = -_get(fields, lane, _DROP + side) * radius * radius if seen <= 2.0 * np.pi else 0.0
+    return factor * x, factor * y, factor * z
 
 
 @helper(error_model="numpy")

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.mesh.vectors import cross_product, dot, minus, plus, times, towards, vector_at, wall_distance
-from porefv.system.kernels import helper, kernel
+from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 class FacetTopology(NamedTuple):
@@ -214,6 +214,30 @@ def facet_centroids(facet_vertices, vertices):
         for axis in range(3):
             centres[f, axis] = x[axis]
     return centres
+
+
+@kernel
+def sector_angles(first, last, facet_vertices, sectors, vertices, angles):
+    """Fill in 2 Σ A^k / r² of facets first ... last - 1: the angles of their sectors, less what overlaps leave out.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
+    facet_vertices : (f, 3) int32 array
+    sectors : (f, 3) array
+        A^k, inside the sphere of each vertex, 0 for walls [m²].
+    vertices : Vertices
+    angles : (f,) array
+        To be filled in [-].
+    """
+    for f in unsigned_range(first, last):
+        total = 0.0
+        for v in range(3):
+            k = facet_vertices[f, v]
+            if k < vertices.n_spheres:
+                total += sectors[f, v] / (vertices.sizes[k] * vertices.sizes[k])
+        angles[f] = 2.0 * total
 
 
 @kernel

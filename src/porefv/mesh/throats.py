@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from porefv.mesh.facet_kernels import row_sums
+from porefv.mesh.facet_kernels import row_sums, sector_angles
 from porefv.mesh.inscribed_circles import Circles, TiedCircles, circles_of_throats, inscribed_circles
 from porefv.mesh.uniting import tied_facets
 from porefv.system.lazy import FixedInputs, lazy_property
@@ -165,10 +165,10 @@ class Throats(FixedInputs):
 
         The section at height s is A^f + Σ θ s² / 2, with θ the angles of the spheres. Zero where A^f is not positive.
         """
-        facets, n = self.mesh.facets, self.mesh.n_spheres
-        of_spheres = facets.vertices < n
-        radii = self.mesh.sizes[np.where(of_spheres, facets.vertices, 0)]
-        angles = self.total_by_facet(2.0 * (facets.sectors / radii**2 * of_spheres).sum(axis=1))
+        facets = self.mesh.facets
+        angles = np.empty(len(facets))
+        for_rows(sector_angles, len(angles), facets.vertices, facets.sectors, self.mesh.cell_vertices, angles)
+        angles = self.total_by_facet(angles)
         areas = np.maximum(self.total_by_facet(facets.fluid_areas), 0.0)
         return np.sqrt(np.divide(2.0 * areas, angles, out=np.zeros_like(areas), where=angles > 0.0))
 

@@ -223,6 +223,31 @@ def _sections(t, throats, facets, vertices, necks, drag, radii, angles):
     )
 
 
+@kernel
+def centres_beyond_vertices(first, last, first_facets, facets, ends, beyond):
+    """Fill in, of throats first ... last - 1, whether a pore's centre is further from its neck than the vertex is.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
+    first_facets : (t,) int array
+        A facet of each throat.
+    facets : FacetPlanes
+    ends : Ends
+    beyond : (t,) bool array
+        To be filled in.
+    """
+    for t in unsigned_range(first, last):
+        f = first_facets[t]
+        normal = vector_at(f, facets.normals)
+        i = facets.cells[f, 0]
+        j = facets.cells[f, 1]
+        up_i = dot(minus(vector_at(i, ends.centres), vector_at(i, ends.laguerre_vertices)), normal)
+        up_j = dot(minus(vector_at(j, ends.centres), vector_at(j, ends.laguerre_vertices)), normal)
+        beyond[t] = up_i < 0.0 or up_j > 0.0
+
+
 @helper
 def _span(f, facets, vertices, points, length):
     """Heights over facet f, times √½, between which its throat extends: those of two points (m, 3) of its cells.

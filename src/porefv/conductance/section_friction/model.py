@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.conductance.model import ConductanceModel, DropBeyondVertices
-from porefv.conductance.section_friction.friction_kernels import Drag, Ends, Necks, section_friction
+from porefv.conductance.section_friction.friction_kernels import (
+    Drag,
+    Ends,
+    Necks,
+    centres_beyond_vertices,
+    section_friction,
+)
 from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.errors import InputError
 from porefv.mesh.throats import Throats
@@ -54,11 +60,11 @@ class SectionFriction(ConductanceModel):
 
     def drop_beyond_vertices(self, throats: Throats, slip: np.ndarray) -> DropBeyondVertices:
         """The part of each throat's drop that is lost between a pore's Laguerre vertex and its centre, if beyond."""
-        facets, moves = throats.mesh.facets, throats.derived(centres_of_pores) - throats.mesh.local_vertices
-        first, second = facets.cells[throats.first_facets].T
-        normals = throats.normals
-        away = np.stack([-(moves[first] * normals).sum(1), (moves[second] * normals).sum(1)])
-        which = np.flatnonzero((away > 0.0).any(axis=0))
+        mesh = throats.mesh
+        away = np.empty(len(throats), bool)
+        ends = Ends(mesh.local_vertices, throats.derived(centres_of_pores))
+        for_rows(centres_beyond_vertices, len(throats), throats.first_facets, mesh.facets.planes, ends, away)
+        which = np.flatnonzero(away)
         return DropBeyondVertices(which, self._friction(throats, slip, which, beyond=True)[1])
 
     def _friction(
