@@ -53,7 +53,10 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
 @kernel
 def tied_facets(facet_cells, cell_node, cell_pore):
     """Facets between two pores both of whose Laguerre vertices are shared by several cells."""
-    cells = np.zeros(cell_node.max() + 1, np.int32)
+    most = -1
+    for t in range(cell_node.shape[0]):
+        most = max(most, cell_node[t])
+    cells = np.zeros(most + 1, np.int32)
     for t in range(cell_node.shape[0]):
         cells[cell_node[t]] += 1
     found = np.empty(64, np.int64)
