@@ -349,7 +349,7 @@ def test_grains_that_swing_for_ever_are_not_at_rest():
 
 def test_a_run_is_the_same_to_the_bit_on_any_number_of_threads(reference, monkeypatch):
     rough = Material(young=E, stiffness_ratio=0.5, friction_angle=30.0, density=1000.0)
-    monkeypatch.setattr(threads, "_processors", lambda: 3)
+    monkeypatch.setattr(threads, "processors", lambda: 3)
 
     def final(count):
         with threads.limited_threads(count):

@@ -175,7 +175,7 @@ def test_repeated_solutions_are_equal_to_the_bit(solver):
 
 
 def test_solutions_do_not_depend_on_the_number_of_threads(monkeypatch):
-    monkeypatch.setattr(threads, "_processors", lambda: 3)
+    monkeypatch.setattr(threads, "processors", lambda: 3)
     network, rhs = grid_network(38, 6)  # large enough to be cut into parts
     with threads.limited_threads(1):
         one, _ = solve(network, rhs, "cg")

@@ -119,7 +119,7 @@ def main() -> None:
     """Compare with the record, or write it."""
     with tempfile.TemporaryDirectory() as folder:
         for count in (1, 2):
-            threads._processors = lambda count=count: count
+            threads.processors = lambda count=count: count
             run_everything(Path(folder))
     if "--write" in sys.argv:
         RECORD.write_text(json.dumps(needed(), indent=1) + "\n", encoding="utf-8")

@@ -21,13 +21,13 @@ PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 @pytest.fixture
 def four(monkeypatch):
     """A machine of four processors, without quota or variables."""
-    monkeypatch.setattr(threads, "_processors", lambda: 4)
-    monkeypatch.setattr(threads, "_quota", lambda: sys.maxsize)
+    monkeypatch.setattr(threads, "processors", lambda: 4)
+    monkeypatch.setattr(threads, "quota", lambda: sys.maxsize)
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
-    threads._lasting_limit.cache_clear()
+    threads.lasting_limit.cache_clear()
     yield
-    threads._lasting_limit.cache_clear()
+    threads.lasting_limit.cache_clear()
 
 
 # ---- how many ----------
@@ -44,7 +44,7 @@ def four(monkeypatch):
 def test_the_least_of_all_limits_counts(four, monkeypatch, variables, expected):
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
-    threads._lasting_limit.cache_clear()
+    threads.lasting_limit.cache_clear()
     assert thread_count() == expected
     with limited_threads(2):
         assert thread_count() == min(2, expected)
@@ -90,7 +90,7 @@ def test_the_quota_of_a_control_group(tmp_path, files, expected):
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    assert threads._quota(tmp_path) == expected
+    assert threads.quota(tmp_path) == expected
 
 
 # ---- the work ----------
@@ -162,7 +162,7 @@ def test_a_call_within_work_that_is_shared_ends(four):
 def test_nobody_waits_for_a_thread_that_has_not_begun(four):
     # All threads of the pool are busy: the caller does the work alone.
     release = threading.Event()
-    busy = [threads._pool().submit(release.wait) for _ in range(os.cpu_count())]
+    busy = [threads.pool().submit(release.wait) for _ in range(os.cpu_count())]
     try:
         begin = time.perf_counter()
         assert for_each(lambda item: item, range(4)) == list(range(4))

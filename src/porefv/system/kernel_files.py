@@ -83,7 +83,7 @@ class KernelFiles(caching._Cache):
             content = _read(path)
             if content is not None:
                 return CompileResult._rebuild(target_context, *pickle.loads(content))
-        _announce()
+        announce()
         return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -120,7 +120,7 @@ class KernelFiles(caching._Cache):
     def _file_name(self, signature: Any, processor: str) -> str:
         arguments = getattr(signature, "args", signature)
         digest = hashlib.sha256(
-            "\n".join((_versions(), processor, _stamp(self._kernel), types_text(arguments))).encode()
+            "\n".join((_versions(), processor, stamp(self._kernel), types_text(arguments))).encode()
         )
         return f"{self._name}-{digest.hexdigest()[:24]}{_ENDING}"
 
@@ -206,15 +206,18 @@ def _warn(reason: str) -> None:
 _tell: Callable[[str], None] | None = None
 
 
-def on_compilation(tell: Callable[[str], None]) -> None:
-    """Have a function told, in a sentence, when the first kernel is about to be compiled in this process."""
+def on_compilation(tell: Callable[[str], None] | None) -> None:
+    """Have a function told, in a sentence, when the first kernel is about to be compiled in this process.
+
+    Without one, a package that was built for another machine, or for another version of numba, warns.
+    """
     global _tell
     _tell = tell
 
 
 @cache
-def _announce() -> None:
-    """Once in a process."""
+def announce() -> None:
+    """Say, once in a process, that something is compiled."""
     reason = _why_not_built()
     sentence = "compiling for this machine, this once; it takes about half a minute"
     if reason:
@@ -266,7 +269,7 @@ def _has_baseline() -> bool:
 
 
 @cache
-def _stamp(kernel: Any) -> str:
+def stamp(kernel: Any) -> str:
     """Digest of the code of a kernel and of all that it calls, with the constants they use."""
     digest = hashlib.sha256()
     for part in _parts(kernel, set()):

@@ -36,7 +36,7 @@ def thread_count() -> int:
     The least of the processors that the process may use, of the quota of its control groups (a container, a batch
     job), of the variables OMP_NUM_THREADS and NUMBA_NUM_THREADS, and of what `limit_threads` was given.
     """
-    allowed = min(_processors(), _lasting_limit())
+    allowed = min(processors(), lasting_limit())
     return max(1, allowed if _limit is None else min(allowed, _limit))
 
 
@@ -82,7 +82,7 @@ def for_each(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
     futures: list[Future[None]] = []
     try:
-        futures.extend(_pool().submit(take) for _ in range(others))
+        futures.extend(pool().submit(take) for _ in range(others))
         take()
     finally:
         # A thread that has not begun yet is not waited for.
@@ -119,17 +119,18 @@ def for_blocks(kernel: Callable[..., R], rows: int, size: int, *arguments: Any) 
 
 
 @cache
-def _pool() -> ThreadPoolExecutor:
+def pool() -> ThreadPoolExecutor:
     """Threads are started when they are first needed, and sleep between."""
     return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="porefv")
 
 
 if hasattr(os, "register_at_fork"):
     # A child process has none of its parent's threads.
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=pool.cache_clear)
 
 
-def _processors() -> int:
+def processors() -> int:
+    """How many the process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not Linux
@@ -137,9 +138,9 @@ def _processors() -> int:
 
 
 @cache
-def _lasting_limit() -> int:
+def lasting_limit() -> int:
     """What the quota and the variables of the process allow, looked at once: it takes longer than handing work over."""
-    return min(_quota(), *_variables(), sys.maxsize)
+    return min(quota(), *_variables(), sys.maxsize)
 
 
 def _variables() -> Iterator[int]:
@@ -151,7 +152,7 @@ def _variables() -> Iterator[int]:
                 yield count
 
 
-def _quota(root: Path = Path("/")) -> int:
+def quota(root: Path = Path("/")) -> int:
     """Processors' worth of time that the least quota of a control group grants; `sys.maxsize` without one.
 
     Parameters
@@ -159,16 +160,16 @@ def _quota(root: Path = Path("/")) -> int:
     root : Path
         Where /proc and /sys are.
     """
-    return min((math.ceil(quota) for quota in _quotas(root)), default=sys.maxsize)
+    return min((math.ceil(share) for share in _quotas(root)), default=sys.maxsize)
 
 
 def _quotas(root: Path) -> Iterator[float]:
     for group in control_groups(root, "cpu"):
         with suppress(OSError, ValueError):  # no such file, or "max": no limit
             if group.version == 2:
-                quota, period = (group.folder / "cpu.max").read_text().split()
+                granted, period = (group.folder / "cpu.max").read_text().split()
             else:
-                quota = (group.folder / "cpu.cfs_quota_us").read_text()
+                granted = (group.folder / "cpu.cfs_quota_us").read_text()
                 period = (group.folder / "cpu.cfs_period_us").read_text()
-            if int(quota) > 0:  # -1: no limit
-                yield int(quota) / int(period)
+            if int(granted) > 0:  # -1: no limit
+                yield int(granted) / int(period)
