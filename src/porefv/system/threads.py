@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
@@ -27,7 +28,15 @@ _MOST_ROWS = 1 << 16
 # Blocks that each thread should get, so that one that is held up leaves the rest to the others.
 _BLOCKS_EACH = 4
 
+# Where others are waited for so long, and for half as long as this thread has worked, they have been held up: the
+# processors are busy with other processes. This thread then works alone, for so many times as long, or so many seconds
+# at most, for such waits to be a small part of all.
+_HELD_UP = 1e-3
+_ALONE = 30.0
+_MOST_ALONE = 1.0
+
 _limit: int | None = None
+_alone_until = 0.0
 
 
 def thread_count() -> int:
@@ -62,8 +71,9 @@ def for_each(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
     An exception, of `work` or by Ctrl-C, ends it as soon as the items that were begun are done.
     """
+    global _alone_until
     others = min(thread_count(), len(items)) - 1
-    if others <= 0:
+    if others <= 0 or time.perf_counter() < _alone_until:
         return [work(item) for item in items]
     results: list[Any] = [None] * len(items)
     left = enumerate(items)  # the threads have it in common: each item is taken once
@@ -81,15 +91,20 @@ def for_each(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
             raise
 
     futures: list[Future[None]] = []
+    begin = done = time.perf_counter()
     try:
         futures.extend(pool().submit(take) for _ in range(others))
         take()
+        done = time.perf_counter()
     finally:
         # A thread that has not begun yet is not waited for.
         begun = [future for future in futures if not future.cancel()]
         wait(begun)
     for future in begun:
         future.result()
+    waited = time.perf_counter() - done
+    if waited > max(_HELD_UP, 0.5 * (done - begin)):
+        _alone_until = time.perf_counter() + min(_ALONE * waited, _MOST_ALONE)
     return results
 
 
