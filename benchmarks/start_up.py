@@ -3,9 +3,9 @@
     python benchmarks/start_up.py [--repeat 5] [--install]
 
 Medians, with kernels compiled before, of `porefv --help`, of importing porefv, of `porefv check` and of a warm `porefv
-solve` of 25 and of 2000 spheres; beside the last its own computation, as summary.json has it. `--install` measures, before
-that, what compiling takes: the build's step of its own, the first solve after `pip install .` in an environment of its own,
-and the first solve in a working copy that has kept nothing.
+solve` of 25 and of 2000 spheres; beside the last its own computation, as summary.json has it. `--install` measures,
+before that, what compiling takes: the build's step of its own, the first solve after `pip install .` in an environment
+of its own, and the first solve in a working copy that has kept nothing.
 """
 
 from __future__ import annotations
