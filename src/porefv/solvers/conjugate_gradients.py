@@ -44,8 +44,8 @@ class Operator(Protocol):
 class Preconditioner(Protocol):
     """An approximate inverse M⁻¹ of an operator."""
 
-    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
-        """z = M⁻¹ r; returns r·z. `y`, (n,), is room to work in."""
+    def apply(self, r: np.ndarray, z: np.ndarray) -> float:
+        """z = M⁻¹ r; returns r·z."""
         ...
 
 
@@ -83,7 +83,7 @@ def preconditioned_cg(
     rule : StoppingRule
     limit : int
         Most iterations.
-    room : (4, n) array, optional
+    room : (3, n) array, optional
         To work in.
 
     Returns
@@ -94,8 +94,8 @@ def preconditioned_cg(
         has then spoilt the factor, or the numbers are not finite.
     """
     n = len(x)
-    q, aq, z, y = np.empty((4, n)) if room is None else room
-    rz = preconditioner.apply(r, z, y)
+    q, aq, z = np.empty((3, n)) if room is None else room
+    rz = preconditioner.apply(r, z)
     q[:] = z
     iterations = 0
     while not rule.met_before(rz):
@@ -107,7 +107,7 @@ def preconditioned_cg(
             return iterations, False
         if rule.met_after(iterations, sum(for_blocks(_advance, n, BLOCK, x, r, q, aq, rz / power))):
             return iterations, True
-        before, rz = rz, preconditioner.apply(r, z, y)
+        before, rz = rz, preconditioner.apply(r, z)
         for_rows(_redirect, n, q, z, rz / before, least=_CHEAP)
     return iterations, True
 
@@ -295,8 +295,8 @@ class _Approximation:
     @cached_property
     def error(self) -> float:
         """Estimate of the largest error of a pressure: what A⁻¹ makes of |b - A (x + rest)| [Pa]."""
-        z, room = np.empty((2, len(self.x)))
-        self.equation.preconditioner.apply(np.abs(self.residual), z, room)
+        z = np.empty(len(self.x))
+        self.equation.preconditioner.apply(np.abs(self.residual), z)
         return float(np.abs(z).max(initial=0.0))
 
     def conserves(self, tolerance: float) -> bool:
