@@ -71,6 +71,8 @@ def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if function is None:
         return lambda function: helper(function, **options)
     options.setdefault("forceinline", "inline" not in options)
+    if not options["forceinline"] and "inline" not in options:
+        options["_nrt"] = True
     return _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 
