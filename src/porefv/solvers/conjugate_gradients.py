@@ -262,10 +262,20 @@ class _Equation:
     sources: np.ndarray
     preconditioner: Preconditioner
 
+    @cached_property
+    def _leaking(self) -> np.ndarray:
+        """Nodes with leaks: few of all."""
+        return np.flatnonzero(self.network.leaks)
+
+    @cached_property
+    def _injected(self) -> float:
+        return float(np.abs(self.sources).sum())
+
     def flow(self, x: np.ndarray, rest: np.ndarray) -> float:
         """Half of all that enters or leaves with the pressures x + rest [m³/s]."""
-        entering = self.network.leaks * ((self.held - x) - rest)
-        return 0.5 * float(np.abs(entering).sum() + np.abs(self.sources).sum())
+        nodes = self._leaking
+        entering = self.network.leaks[nodes] * ((self.held[nodes] - x[nodes]) - rest[nodes])
+        return 0.5 * (float(np.abs(entering).sum()) + self._injected)
 
 
 @dataclass(frozen=True, eq=False)

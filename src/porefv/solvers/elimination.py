@@ -1,8 +1,9 @@
 """Elimination of the nodes of a network with sampled fill: its approximate Cholesky factor, column by column.
 
 A node that is eliminated leaves a column of the factor: its links, divided by the sum of their weights, the pivot.
-Exact elimination then links all its neighbours to each other. Here a random graph with few links takes the place of
-that clique, and has the same mean (`approximate_cholesky` has the references).
+Exact elimination then links all its neighbours to each other. Here a random graph takes the place of that clique, with
+the same mean and no more links than the node had: they take over its links' places in memory (`approximate_cholesky`
+has the references).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _NEIGHBOUR = np.dtype(
 # No record, no place in a star, and for `other`: no longer in use.
 _NONE = -1
 # Columns are filled up with zeros in their own row to a multiple of so many entries (see `substitution.Factor`).
-FILLED_TO = 4
+_FILLED_TO = 4
 # Nodes of up to so many half-links are eliminated in the first sweep.
 _FIRST_LIMIT = 3
 # Places in `counts`: nodes eliminated, entries and kept links made, nodes looked at in a sweep, and left by it.
@@ -106,9 +107,7 @@ def eliminated(network: NetworkRows, n: int) -> Elimination:
     That is done in sweeps along the numbering. A sweep eliminates nodes of at most `limit` half-links, and leaves the
     others to the next. The limit grows when a sweep has found few. Equal networks give equal results.
     """
-    lists = Lists(
-        np.empty(len(network.leaks), _NODE), np.empty(len(network.columns), _HALF_LINK), network.leaks.copy()
-    )
+    lists = Lists(np.empty(len(network.leaks), _NODE), np.empty(len(network.columns), _HALF_LINK), network.leaks.copy())
     _put_in_lists(network, n, lists)
     room = 2 * len(network.columns)  # suffices as a rule; what is not used is never touched
     columns = Columns(
@@ -123,12 +122,12 @@ def eliminated(network: NetworkRows, n: int) -> Elimination:
     while counts[_DONE] < n:
         before = int(counts[_DONE])
         counts[_LOOKED_AT] = counts[_LEFT] = 0
-        most = limit + 1  # neighbours
+        most = limit + 1  # neighbours, and links that take the place of a node
         star = np.empty(most, _NEIGHBOUR)
         while not _sweep(limit, lists, star, columns, kept, waiting, random, counts):
-            rows, factors = (_with_room(array, counts[_FILL] + most + FILLED_TO) for array in (columns.rows, columns.factors))
-            columns = columns._replace(rows=rows, factors=factors)
-            kept = KeptLinks(*(_with_room(array, counts[_KEPT] + most) for array in kept))
+            fill = int(counts[_FILL]) + most + _FILLED_TO
+            columns = columns._replace(rows=_with_room(columns.rows, fill), factors=_with_room(columns.factors, fill))
+            kept = KeptLinks(*(_with_room(array, int(counts[_KEPT]) + most) for array in kept))
         waiting = waiting[: counts[_LEFT]]
         if counts[_DONE] - before < 0.3 * (n - before):
             limit += max(1, limit // 2)
@@ -196,7 +195,7 @@ def _sweep(limit, lists, star, columns, kept, waiting, random, counts):
     """
     order, starts, rows, factors, inverse_pivots = columns
     done, fill, left, place = counts[_DONE], counts[_FILL], counts[_LEFT], counts[_LOOKED_AT]
-    most = star.shape[0]  # neighbours and links among them
+    most = star.shape[0]
     while place < waiting.shape[0]:
         i = waiting[place]
         if lists.nodes[i].degree > limit:
@@ -204,7 +203,7 @@ def _sweep(limit, lists, star, columns, kept, waiting, random, counts):
             left += 1
             place += 1
             continue
-        if fill + most + FILLED_TO > rows.shape[0] or counts[_KEPT] + most > kept.weights.shape[0]:
+        if fill + most + _FILLED_TO > rows.shape[0] or counts[_KEPT] + most > kept.weights.shape[0]:
             break
         place += 1
         m = _take_list(i, lists, star)
@@ -219,15 +218,14 @@ def _sweep(limit, lists, star, columns, kept, waiting, random, counts):
             rows[fill] = star[q].node
             factors[fill] = star[q].weight * inverse
             fill += 1
-        while fill % FILLED_TO != 0:
+        while fill % _FILLED_TO != 0:
             rows[fill] = i
             factors[fill] = 0.0
             fill += 1
         done += 1
         starts[done] = fill
         if leak > 0.0:
-            star[m].node = _GROUND
-            star[m].weight = leak
+            star[m].node, star[m].weight = _GROUND, leak
             m += 1
         _sample_fill(star, m, inverse, lists, order.shape[0], kept, random, counts)
     counts[_DONE], counts[_FILL], counts[_LEFT], counts[_LOOKED_AT] = done, fill, left, place
@@ -246,9 +244,7 @@ def _take_list(i, lists, star):
             place = nodes[j].place
             if place == _NONE:
                 nodes[j].place = m
-                star[m].node = j
-                star[m].weight = records[record].weight
-                star[m].record = record
+                star[m].node, star[m].weight, star[m].record = j, records[record].weight, record
                 m += 1
             else:
                 star[place].weight += records[record].weight
@@ -272,21 +268,21 @@ def _sample_fill(star, m, inverse, lists, n, kept, random, counts):
     for q in range(m - 1, -1, -1):
         star[q].beyond = total
         total += star[q].weight
-    for q in range(m):
-        if q >= m - 3:
-            p = q + 1 if q + 1 < m else m - 3
-            if p < 0 or p == q:  # the last of one or two
-                p = q
-            weight = star[q].weight * inverse * star[p].weight
-        else:
+    for q in range(m if m > 2 else m - 1):
+        if q < m - 3:
             aim = uniform(random) * star[q].beyond
             p = m - 1  # the most probable first
             passed = star[p].weight
             while passed < aim and p > q + 1:
                 p -= 1
                 passed += star[p].weight
-            weight = star[q].weight * inverse * star[q].beyond
-        _add_link(q, p, weight, star, lists, n, kept, counts)
+            sum_of_weights = star[q].beyond
+        else:
+            p = q + 1 if q + 1 < m else m - 3
+            sum_of_weights = star[p].weight
+        _add_link(q, p, star[q].weight * inverse * sum_of_weights, star, lists, n, kept, counts)
+    if 0 < m < 3 and star[m - 1].node != _GROUND:  # one or two have no link to spare for the last
+        _drop_reverse(star[m - 1].record, star[m - 1].node, lists)
 
 
 @helper(inline="always")
@@ -303,34 +299,27 @@ def _sort_by_weight(star, m):
 
 @helper(inline="always")
 def _add_link(q, p, weight, star, lists, n, kept, counts):
-    """Link neighbour q of a star to neighbour p, by the records of its link to the star's node; to none where p = q."""
+    """Link neighbour q of a star to neighbour p, by the two records of its link to the star's node."""
     nodes, records, leaks = lists
     i, j = star[q].node, star[p].node
     record = star[q].record
     if i == _GROUND:
-        if j != i:
-            leaks[j] += weight
-    elif j == _GROUND or j == i:
-        if j != i:
-            leaks[i] += weight
+        leaks[j] += weight
+    elif j == _GROUND:
+        leaks[i] += weight
         _drop_reverse(record, i, lists)
     elif i >= n and j >= n:
         k = counts[_KEPT]
-        kept.pairs[k, 0] = i
-        kept.pairs[k, 1] = j
-        kept.weights[k] = weight
+        kept.pairs[k, 0], kept.pairs[k, 1], kept.weights[k] = i, j, weight
         counts[_KEPT] += 1
     else:
         reverse = records[record].reverse
         if i < n:
-            records[reverse].other = j
-            records[reverse].weight = weight
+            records[reverse].other, records[reverse].weight = j, weight
             records[reverse].reverse = record if j < n else _NONE
         if j < n:
-            records[record].other = i
-            records[record].weight = weight
-            records[record].following = nodes[j].head  # `reverse` stays
-            nodes[j].head = record
+            records[record].other, records[record].weight = i, weight  # `reverse` stays as it is
+            records[record].following, nodes[j].head = nodes[j].head, record
             nodes[j].degree += 1
 
 

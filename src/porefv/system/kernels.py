@@ -72,7 +72,7 @@ def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
         return lambda function: helper(function, **options)
     options.setdefault("forceinline", "inline" not in options)
     if not options["forceinline"] and "inline" not in options:
-        options["_nrt"] = True
+        options["_nrt"] = True  # it may make arrays, whoever calls it
     return _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 
