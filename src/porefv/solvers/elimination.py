@@ -20,16 +20,12 @@ from porefv.system.random_numbers import random_state, uniform
 _GROUND = -1
 # One end of a link, in the list of the node there: what the other end is, the record of it in the list there, and the
 # record that follows. One record, so that following a list misses the cache once a link.
-_HALF_LINK = np.dtype(
-    [("weight", np.float64), ("other", np.int32), ("reverse", np.int32), ("following", np.int32)], align=True
-)
+_HALF_LINK = np.dtype([("weight", np.float64), ("other", np.int32), ("reverse", np.int32), ("following", np.int32)])
 # The first record of a node's list, how many records of it are in use, and the node's place in a star.
 _NODE = np.dtype([("head", np.int32), ("degree", np.int32), ("place", np.int32)])
 # A neighbour of a node, `_GROUND` for a leak: the weight of the link to it, the record of that in the list of the node
 # itself, and the sum of the weights of the neighbours that follow.
-_NEIGHBOUR = np.dtype(
-    [("weight", np.float64), ("beyond", np.float64), ("node", np.int32), ("record", np.int32)], align=True
-)
+_NEIGHBOUR = np.dtype([("weight", np.float64), ("beyond", np.float64), ("node", np.int32), ("record", np.int32)])
 # No record, no place in a star, and for `other`: no longer in use.
 _NONE = -1
 # Columns are filled up with zeros in their own row to a multiple of so many entries (see `substitution.Factor`).
