@@ -30,7 +30,7 @@ class Jacobi:
     def __init__(self, diagonal):
         self.diagonal = diagonal
 
-    def apply(self, r, z, y):
+    def apply(self, r, z):
         z[:] = r / self.diagonal
         return float(r @ z)
 

@@ -193,7 +193,7 @@ def test_networks_cut_into_parts_are_solved_as_any_other(order):
     leaks = np.zeros(m**3)
     leaks[pairs[0, 0]], leaks[pairs[-1, 1]] = 1.0, 1.0
     network = Network.from_links(pairs, weights, leaks)
-    assert len(ApproximateCholesky.of(network).parts) > 2
+    assert len(ApproximateCholesky.of(network).parts) > 1
     rhs = np.zeros(m**3)
     rhs[pairs[0, 0]] = 1.0
     x, report = solve(network, rhs, "cg")
@@ -232,9 +232,9 @@ def test_preconditioner_is_symmetric_and_positive():
     rng = np.random.default_rng(0)
     for _ in range(5):
         a, b = rng.normal(size=(2, len(network)))
-        x, y, room = np.empty((3, len(network)))
-        ax = m.apply(a, x, room)
-        m.apply(b, y, room)
+        x, y = np.empty((2, len(network)))
+        ax = m.apply(a, x)
+        m.apply(b, y)
         # Rounding of sums of both signs, relative to their terms.
         assert_allclose(b @ x, a @ y, rtol=0, atol=1e-12 * (np.abs(b) @ np.abs(x) + np.abs(a) @ np.abs(y)))
         assert ax > 0.0
@@ -251,8 +251,8 @@ def test_preconditioner_is_exact_where_elimination_makes_no_fill():
     b = np.random.default_rng(1).random(n)
     # Factors are kept in single precision.
     expected = np.linalg.solve(network.to_matrix().toarray(), b)
-    found, room = np.empty((2, n))
-    ApproximateCholesky.of(network).apply(b, found, room)
+    found = np.empty(n)
+    ApproximateCholesky.of(network).apply(b, found)
     assert_allclose(found, expected, rtol=1e-5)
 
 

@@ -130,7 +130,7 @@ class CoupledPressure:
         self._of_free = exchange.between(self._node)
         self._of_held = exchange.between(np.where(self._node < 0, mesh.cell_pore, -1))
         free = int(np.count_nonzero(self.free))
-        self._room, self._room_for_forces = np.empty((4, free)), np.empty((mesh.n_spheres + 6, 3))
+        self._room, self._room_for_forces = np.empty((3, free)), np.empty((mesh.n_spheres + 6, 3))
         faces = mesh.wall_faces
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
         self._factor: ApproximateCholesky | SparseFactor | None = None

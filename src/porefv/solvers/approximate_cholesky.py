@@ -1,7 +1,9 @@
 """Approximate Cholesky factor of a network, by elimination with sampled fill.
 
-Eliminating a node joins all its neighbours to each other. Instead of that clique a random tree with the same mean
-is added, each neighbour linked to one of the more strongly joined ones with probability in proportion to its link.
+Eliminating a node joins all its neighbours to each other. Instead of that clique a random graph with the same mean
+is added: the three most strongly joined neighbours are linked as in the clique, every other one to one of those more
+strongly joined, with probability in proportion to their links. (A tree, in which only the last two are linked as in
+the clique, has a third more iterations.)
 The factor stays nearly as sparse as the network, for any geometry, size and contrast, and as a preconditioner takes
 conjugate gradients to convergence in a number of steps that hardly depends on them (Kyng and Sachdeva 2016,
 doi:10.1109/FOCS.2016.68; Gao, Kyng and Spielman 2023, arXiv:2303.00709).
@@ -14,26 +16,15 @@ and the random numbers are seeded: equal networks have equal factors, on any num
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from porefv.errors import ComputationError
 from porefv.solvers.elimination import Elimination, eliminated
 from porefv.solvers.network import Network
-from porefv.solvers.network_parts import links_of_separator, part_of_network, separator_numbers
-from porefv.solvers.substitution import (
-    FactorColumns,
-    FactorRows,
-    backward,
-    forward,
-    part_entries_first,
-    rows_from,
-    substitute,
-    substitute_separator,
-    sum_separator_rows,
-)
-from porefv.system.threads import for_each, for_rows
+from porefv.solvers.network_parts import NetworkPart, links_of_separator, part_of_network, separator_numbers
+from porefv.solvers.substitution import Factor, add_outer, backward, forward, substitute, substitute_separator
+from porefv.system.threads import for_each
 
 # Nodes from which two parts pay, and the size beyond which there are more of them.
 _CUT_FROM = 50_000
@@ -42,23 +33,17 @@ _PART = 400_000
 
 @dataclass(frozen=True, eq=False)
 class ApproximateCholesky:
-    """Preconditioner A ≈ L D Lᵀ of a network.
-
-    Positions run over the inner nodes of each part in their order of elimination, then over the separator's.
+    """Preconditioner A ≈ L D Lᵀ of a network. It has room to work in: one thread at a time may apply it.
 
     Attributes
     ----------
-    parts : (p + 1,) int64 array
-        Position where each part starts; the last is where the separator starts.
-    columns : FactorColumns
-        L and D.
-    separator_rows : FactorRows
-        The rows of -L in which the separator depends on the parts, so that every row can be summed by itself.
+    parts : list of Factor
+    separator : Factor
+        Its nodes are those that no part eliminates.
     """
 
-    parts: np.ndarray
-    columns: FactorColumns
-    separator_rows: FactorRows
+    parts: list[Factor]
+    separator: Factor
 
     @classmethod
     def of(cls, network: Network) -> ApproximateCholesky:
@@ -66,79 +51,54 @@ class ApproximateCholesky:
         n = len(network)
         n_parts = 1 if n < _CUT_FROM else 2 * (1 + n // (2 * _PART))
         bounds = np.linspace(0, n, n_parts + 1).astype(np.int64)
-        separator = separator_numbers(network.rows, bounds)
+        number = separator_numbers(network.rows, bounds)
         local = np.empty(n, np.int32)
 
-        def factor(k: int) -> _Piece:
-            part = part_of_network(network.rows, separator, local, bounds[k], bounds[k + 1])
-            return _Piece(part.inner, part.outer, eliminated(part.rows, len(part.inner)))
+        def eliminate(k: int) -> tuple[NetworkPart, Elimination]:
+            part = part_of_network(network.rows, number, local, bounds[k], bounds[k + 1])
+            return part, eliminated(part.rows, len(part.inner))
 
-        pieces = for_each(factor, range(n_parts))
-        pieces.append(_separator_piece(network, separator, pieces))
-
-        pivots = np.concatenate([piece.factor.pivots for piece in pieces])
-        if not (pivots > 0.0).all():
+        pieces = for_each(eliminate, range(n_parts))
+        nodes = np.flatnonzero(number >= 0).astype(np.int32)
+        rest = _rest(network, number, nodes, pieces)
+        last = eliminated(rest.rows, len(rest))
+        inverse_pivots = np.concatenate([piece.inverse_pivots for piece in (*(piece for _, piece in pieces), last)])
+        if not ((inverse_pivots > 0.0) & (inverse_pivots < np.inf)).all():
             raise ComputationError("the network is singular: a part of it is not joined to any imposed pressure")
 
-        order = np.concatenate([piece.inner[piece.factor.order] for piece in pieces])
-        position = np.empty(n, np.int32)
-        position[order] = np.arange(n, dtype=np.int32)
-        fills = np.cumsum([0] + [len(piece.factor.rows) for piece in pieces])
-        parts = np.cumsum([0] + [len(piece.inner) for piece in pieces[:-1]])
-        starts = np.concatenate(
-            [piece.factor.starts[:-1] + fill for piece, fill in zip(pieces, fills, strict=False)] + [fills[-1:]]
-        )
-        rows = np.concatenate([position[piece.nodes[piece.factor.rows]] for piece in pieces])
-        factors = np.concatenate([piece.factor.factors for piece in pieces])
-        starts, rows, part_ends = starts.astype(np.uint32), rows.astype(np.uint32), np.empty(n, np.uint32)
-        part_entries_first(starts, rows, factors, parts[-1] if n_parts > 1 else n, part_ends)
-        columns = FactorColumns(order.astype(np.uint32), starts, rows, factors, part_ends, 1.0 / pivots)
-        return cls(parts, columns, rows_from(columns, parts[-1]))
+        position = np.empty(len(nodes), np.uint32)
+        position[last.order] = np.arange(len(nodes), dtype=np.uint32)
+        parts = [_factor(piece, part.inner, position[number[part.outer]]) for part, piece in pieces]
+        return cls(parts, _factor(last, nodes, position[:0]))
 
-    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
-        """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z. `y`, (n,), is room to work in."""
-        columns, inner = self.columns, int(self.parts[-1])
-        if len(self.parts) == 2:
-            return substitute(columns, r, z, y)
-        parts = list(pairwise(self.parts.tolist()))
-        for_each(lambda part: forward(*part, columns, r, y), parts)
-        for_rows(sum_separator_rows, len(y) - inner, columns, self.separator_rows, inner, r, y, least=4096)
-        product = substitute_separator(columns, inner, r, z, y)
-        return product + sum(for_each(lambda part: backward(*part, columns, r, z, y), parts))
+    def apply(self, r: np.ndarray, z: np.ndarray) -> float:
+        """z = (L D Lᵀ)⁻¹ r, (n,); returns r·z."""
+        if len(self.parts) == 1:
+            return substitute(self.parts[0], r, z)
+        for_each(lambda part: forward(part, r), self.parts)
+        self.separator.y[:] = 0.0
+        for part in self.parts:
+            add_outer(part, self.separator)
+        product = substitute_separator(self.separator, r, z)
+        return product + sum(for_each(lambda part: backward(part, self.separator, r, z), self.parts))
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """The factor of a part, or of the separator.
-
-    Attributes
-    ----------
-    inner : (k,) int32 array
-        Nodes that are eliminated.
-    outer : (l,) int32 array
-        Nodes of the separator next to them.
-    factor : Elimination
-        In it, node i < k is `inner[i]`, and node k + i is `outer[i]`.
-    """
-
-    inner: np.ndarray
-    outer: np.ndarray
-    factor: Elimination
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """(k + l,): node of the network for each of the factor."""
-        return np.concatenate([self.inner, self.outer])
+def _factor(piece: Elimination, nodes: np.ndarray, outer: np.ndarray) -> Factor:
+    """The factor of a part or of the separator, whose nodes are those of the network at `nodes`."""
+    order = nodes[piece.order].astype(np.uint32)
+    y = np.empty(len(order) + len(outer))
+    return Factor(order, piece.starts, piece.rows, piece.factors, piece.inverse_pivots, y, outer)
 
 
-def _separator_piece(network: Network, separator: np.ndarray, pieces: list[_Piece]) -> _Piece:
-    """Factor of what the parts leave: links between nodes of the separator, given and filled in."""
-    nodes = np.flatnonzero(separator >= 0).astype(np.int32)
+def _rest(
+    network: Network, number: np.ndarray, nodes: np.ndarray, pieces: list[tuple[NetworkPart, Elimination]]
+) -> Network:
+    """What the parts leave: the nodes of the separator, by `number`, with their links, given and filled in."""
     leaks = network.leaks[nodes]
-    for piece in pieces:
-        leaks[separator[piece.outer]] += piece.factor.leaks
-    given_pairs, given_weights = links_of_separator(network.rows, separator, nodes)
-    pairs = np.concatenate([given_pairs] + [separator[piece.nodes[piece.factor.pairs]] for piece in pieces])
-    weights = np.concatenate([given_weights] + [piece.factor.weights for piece in pieces])
-    rest = Network.from_links(pairs, weights, leaks)
-    return _Piece(nodes, np.empty(0, np.int32), eliminated(rest.rows, len(rest)))
+    links = [links_of_separator(network.rows, number, nodes)]
+    for part, piece in pieces:
+        outer = number[part.outer]
+        leaks[outer] += piece.leaks
+        links.append((outer[piece.pairs], piece.weights))
+    pairs, weights = (np.concatenate(arrays) for arrays in zip(*links, strict=True))
+    return Network.from_links(pairs, weights, leaks)

@@ -44,8 +44,8 @@ class Operator(Protocol):
 class Preconditioner(Protocol):
     """An approximate inverse M⁻¹ of an operator."""
 
-    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
-        """z = M⁻¹ r; returns r·z. `y`, (n,), is room to work in."""
+    def apply(self, r: np.ndarray, z: np.ndarray) -> float:
+        """z = M⁻¹ r; returns r·z."""
         ...
 
 
@@ -83,7 +83,7 @@ def preconditioned_cg(
     rule : StoppingRule
     limit : int
         Most iterations.
-    room : (4, n) array, optional
+    room : (3, n) array, optional
         To work in.
 
     Returns
@@ -94,8 +94,8 @@ def preconditioned_cg(
         has then spoilt the factor, or the numbers are not finite.
     """
     n = len(x)
-    q, aq, z, y = np.empty((4, n)) if room is None else room
-    rz = preconditioner.apply(r, z, y)
+    q, aq, z = np.empty((3, n)) if room is None else room
+    rz = preconditioner.apply(r, z)
     q[:] = z
     iterations = 0
     while not rule.met_before(rz):
@@ -107,7 +107,7 @@ def preconditioned_cg(
             return iterations, False
         if rule.met_after(iterations, sum(for_blocks(_advance, n, BLOCK, x, r, q, aq, rz / power))):
             return iterations, True
-        before, rz = rz, preconditioner.apply(r, z, y)
+        before, rz = rz, preconditioner.apply(r, z)
         for_rows(_redirect, n, q, z, rz / before, least=_CHEAP)
     return iterations, True
 
@@ -262,10 +262,20 @@ class _Equation:
     sources: np.ndarray
     preconditioner: Preconditioner
 
+    @cached_property
+    def _leaking(self) -> np.ndarray:
+        """Nodes with leaks: few of all."""
+        return np.flatnonzero(self.network.leaks)
+
+    @cached_property
+    def _injected(self) -> float:
+        return float(np.abs(self.sources).sum())
+
     def flow(self, x: np.ndarray, rest: np.ndarray) -> float:
         """Half of all that enters or leaves with the pressures x + rest [m³/s]."""
-        entering = self.network.leaks * ((self.held - x) - rest)
-        return 0.5 * float(np.abs(entering).sum() + np.abs(self.sources).sum())
+        nodes = self._leaking
+        entering = self.network.leaks[nodes] * ((self.held[nodes] - x[nodes]) - rest[nodes])
+        return 0.5 * (float(np.abs(entering).sum()) + self._injected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,8 +305,8 @@ class _Approximation:
     @cached_property
     def error(self) -> float:
         """Estimate of the largest error of a pressure: what A⁻¹ makes of |b - A (x + rest)| [Pa]."""
-        z, room = np.empty((2, len(self.x)))
-        self.equation.preconditioner.apply(np.abs(self.residual), z, room)
+        z = np.empty(len(self.x))
+        self.equation.preconditioner.apply(np.abs(self.residual), z)
         return float(np.abs(z).max(initial=0.0))
 
     def conserves(self, tolerance: float) -> bool:

@@ -34,10 +34,9 @@ class SparseFactor:
                 "the network is singular: a part of it is not joined to any imposed pressure"
             ) from None
 
-    def apply(self, r: np.ndarray, z: np.ndarray, y: np.ndarray) -> float:
+    def apply(self, r: np.ndarray, z: np.ndarray) -> float:
         """z = A⁻¹ r but for rounding; returns r·z. The same as `ApproximateCholesky.apply`."""
-        np.multiply(self.scale, r, out=y)
-        np.multiply(self.scale, self.factor.solve(y), out=z)
+        np.multiply(self.scale, self.factor.solve(self.scale * r), out=z)
         return float((r * z).sum())
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from porefv.system.kernels import kernel
+from porefv.system.kernels import kernel, unsigned_range
 from porefv.system.threads import for_blocks, for_rows
 
 if TYPE_CHECKING:
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Sums run over blocks of so many nodes, so that they do not depend on the number of threads.
 BLOCK = 16384
+
+_ONE = np.uint64(1)
 
 
 class NetworkRows(NamedTuple):
@@ -171,15 +173,19 @@ def _fill(pairs, weights, number, place, columns, links, diagonal):
         place[b] += 1
 
 
-@kernel
+# The kernels that follow are what the iteration spends its time in: without sign, indices need no look at whether they
+# count from the end, and the links of a node are taken several at a time.
+
+
+@kernel(fastmath={"contract"})
 def _multiply(first, last, network, q, aq):
     """Rows first ... last - 1 of aq = A q; returns their part of q·aq."""
     starts, columns, links, leaks = network
     total = 0.0
-    for i in range(first, last):
+    for i in unsigned_range(first, last):
         s = leaks[i] * q[i]
-        for k in range(starts[i], starts[i + 1]):
-            s += links[k] * (q[i] - q[columns[k]])
+        for k in unsigned_range(starts[i], starts[i + _ONE]):
+            s += links[k] * (q[i] - q[np.uint32(columns[k])])
         aq[i] = s
         total += s * q[i]
     return total
@@ -189,10 +195,10 @@ def _multiply(first, last, network, q, aq):
 def _residual(first, last, network, rhs, x, out):
     """Rows first ... last - 1 of out = b - A x."""
     starts, columns, links, leaks = network
-    for i in range(first, last):
+    for i in unsigned_range(first, last):
         s = rhs[i] - leaks[i] * x[i]
-        for k in range(starts[i], starts[i + 1]):
-            s -= links[k] * (x[i] - x[columns[k]])
+        for k in unsigned_range(starts[i], starts[i + _ONE]):
+            s -= links[k] * (x[i] - x[np.uint32(columns[k])])
         out[i] = s
 
 
@@ -200,9 +206,9 @@ def _residual(first, last, network, rhs, x, out):
 def _split_residual(first, last, network, held, sources, x, rest, out):
     """Rows first ... last - 1 of out = leaks held + sources - A (x + rest)."""
     starts, columns, links, leaks = network
-    for i in range(first, last):
+    for i in unsigned_range(first, last):
         s = sources[i] + leaks[i] * ((held[i] - x[i]) - rest[i])
-        for k in range(starts[i], starts[i + 1]):
-            j = columns[k]
+        for k in unsigned_range(starts[i], starts[i + _ONE]):
+            j = np.uint32(columns[k])
             s -= links[k] * ((x[i] - x[j]) + (rest[i] - rest[j]))
         out[i] = s

@@ -127,10 +127,12 @@ def _held_beside(pairs, conductances, pressure, free, inflow, leaks):
     """(number of free pores,): mean pressure of the held pores beside each free one, exact where they are equal."""
     number = np.cumsum(free) - 1
     lowest, highest = np.full(len(leaks), np.inf), np.full(len(leaks), -np.inf)
-    for a, b in (pairs.T, pairs.T[::-1]):
-        beside = free[a] & ~free[b] & (conductances > 0.0)
-        np.minimum.at(lowest, number[a[beside]], pressure[b[beside]])
-        np.maximum.at(highest, number[a[beside]], pressure[b[beside]])
+    i, j = pairs.T
+    across = (free[i] != free[j]) & (conductances > 0.0)
+    i, j = i[across], j[across]
+    node, beside = number[np.where(free[i], i, j)], pressure[np.where(free[i], j, i)]
+    np.minimum.at(lowest, node, beside)
+    np.maximum.at(highest, node, beside)
     mean = np.divide(inflow, leaks, out=np.zeros(len(leaks)), where=leaks > 0.0)
     return np.where(lowest == highest, lowest, mean)
 

@@ -8,183 +8,120 @@ import numpy as np
 
 from porefv.system.kernels import helper, kernel, unsigned_range
 
+_ONE, _TWO, _THREE, _FOUR = np.uint32(1), np.uint32(2), np.uint32(3), np.uint32(4)
 
-class FactorColumns(NamedTuple):
-    """A factor L D Lᵀ, column by column. Indices without sign need no look at whether they count from the end.
+
+class Factor(NamedTuple):
+    """A factor L D Lᵀ of n nodes that are eliminated and m - n that are not, column by column.
 
     Attributes
     ----------
     order : (n,) uint32 array
-        Node at each position.
+        Node at each position. Indices without sign need no look at whether they count from the end.
     starts : (n + 1,) uint32, rows : (fill,) uint32, factors : (fill,) float32 arrays
-        Column k of -L below its unit diagonal has the entries starts[k] ... starts[k + 1] - 1 of `factors`, in `rows`.
-    part_ends : (n,) uint32 array
-        Where the entries of column k in rows of its own part end; those in rows of the separator follow.
+        Column k of -L below its unit diagonal has the entries starts[k] ... starts[k + 1] - 1 of `factors`, in `rows`,
+        filled up to a multiple of four by zeros in its own row: most loops are then as long as the one before, as the
+        processor expects them to be.
     inverse_pivots : (n,) array
         1 / D [Pa s/m³].
+    y : (m,) array
+        Room to work in: what lies between the two substitutions.
+    outer : (m - n,) uint32 array
+        Position in the separator of the nodes that are not eliminated.
     """
 
     order: np.ndarray
     starts: np.ndarray
     rows: np.ndarray
     factors: np.ndarray
-    part_ends: np.ndarray
     inverse_pivots: np.ndarray
-
-
-class FactorRows(NamedTuple):
-    """The last rows of -L, row by row: entries starts[i] ... starts[i + 1] - 1 of `factors`, in `columns`.
-
-    Attributes
-    ----------
-    starts : (m + 1,) int64, columns : (e,) int32, factors : (e,) float32 arrays
-    """
-
-    starts: np.ndarray
-    columns: np.ndarray
-    factors: np.ndarray
-
-
-@kernel
-def part_entries_first(starts, rows, factors, n_inner, part_ends):
-    """Put the entries of each column in rows before n_inner before the others, and fill in where they end."""
-    for k in range(part_ends.shape[0]):
-        end = np.int64(starts[k])
-        for e in range(np.int64(starts[k]), np.int64(starts[k + 1])):
-            if rows[e] < n_inner:
-                row, factor = rows[e], factors[e]
-                for i in range(e, end, -1):
-                    rows[i] = rows[i - 1]
-                    factors[i] = factors[i - 1]
-                rows[end] = row
-                factors[end] = factor
-                end += 1
-        part_ends[k] = end
-
-
-@kernel
-def rows_from(factor, n_inner):
-    """The entries of the first n_inner columns in the rows from n_inner on."""
-    starts, rows, factors = factor.starts, factor.rows, factor.factors
-    n = starts.shape[0] - 1
-    row_starts = np.zeros(n - n_inner + 1, np.int64)
-    for e in range(starts[n_inner]):
-        if rows[e] >= n_inner:
-            row_starts[rows[e] - n_inner + 1] += 1
-    for i in range(n - n_inner):
-        row_starts[i + 1] += row_starts[i]
-    columns = np.empty(row_starts[-1], np.int32)
-    row_factors = np.empty(row_starts[-1], np.float32)
-    place = row_starts[:-1].copy()
-    for k in range(n_inner):
-        for e in range(starts[k], starts[k + 1]):
-            i = np.int64(rows[e]) - n_inner
-            if i >= 0:
-                columns[place[i]] = k
-                row_factors[place[i]] = factors[e]
-                place[i] += 1
-    return FactorRows(row_starts, columns, row_factors)
+    y: np.ndarray
+    outer: np.ndarray
 
 
 @kernel(error_model="numpy")
-def substitute(factor, r, z, y):
-    """z = (L D Lᵀ)⁻¹ r, by way of y; returns r·z.
+def substitute(factor, r, z):
+    """z = (L D Lᵀ)⁻¹ r of a network in one piece; returns r·z."""
+    _gather(factor, r)
+    _forward(factor)
+    return _backward(factor, r, z)
 
-    Parameters
-    ----------
-    factor : named tuple of arrays
-        Order of the nodes, and the columns of L and D.
-    r : (n,) float64 array
-        Right-hand side.
-    z, y : (n,) float64 arrays
-        To fill: the result, and what lies between the two substitutions.
-    """
-    order, starts, rows, factors, _, _ = factor
-    n = order.shape[0]
-    for k in range(n):
+
+@kernel
+def forward(part, r):
+    """y = L⁻¹ r within one part; for its outer nodes, what they get from it."""
+    _gather(part, r)
+    y = part.y
+    for k in range(part.order.shape[0], y.shape[0]):
+        y[k] = 0.0
+    _forward(part)
+
+
+@kernel(error_model="numpy")
+def substitute_separator(separator, r, z):
+    """Both substitutions within the separator, whose y has what it gets from the parts; returns its part of r·z."""
+    order, y = separator.order, separator.y
+    for k in range(order.shape[0]):
+        y[k] += r[order[k]]
+    _forward(separator)
+    return _backward(separator, r, z)
+
+
+@kernel(error_model="numpy")
+def backward(part, separator, r, z):
+    """y and z = L⁻ᵀ D⁻¹ y within one part, from the y of the separator; returns its part of r·z."""
+    outer, y = part.outer, part.y
+    n = part.order.shape[0]
+    for k in range(outer.shape[0]):
+        y[n + k] = separator.y[outer[k]]
+    return _backward(part, r, z)
+
+
+@kernel
+def add_outer(part, separator):
+    """Add what a part's outer nodes get from it to the y of the separator."""
+    n = part.order.shape[0]
+    for k in range(part.outer.shape[0]):
+        separator.y[part.outer[k]] += part.y[n + k]
+
+
+@helper
+def _gather(factor, r):
+    order, y = factor.order, factor.y
+    for k in unsigned_range(0, order.shape[0]):
         y[k] = r[order[k]]
-    for k in range(n):
+
+
+@helper(fastmath={"contract"})
+def _forward(factor):
+    """y = L⁻¹ y."""
+    starts, rows, factors, y = factor.starts, factor.rows, factor.factors, factor.y
+    for k in unsigned_range(0, factor.order.shape[0]):
         v = y[k]
-        for e in range(starts[k], starts[k + 1]):
-            y[rows[e]] += factors[e] * v
-    return _backward(0, n, factor, r, z, y)
+        for a in range(starts[k], starts[k + _ONE], _FOUR):
+            b, c, d = a + _ONE, a + _TWO, a + _THREE
+            # All four are read before one is written: the processor need not see that they differ.
+            at_a = y[rows[a]] + factors[a] * v
+            at_b = y[rows[b]] + factors[b] * v
+            at_c = y[rows[c]] + factors[c] * v
+            at_d = y[rows[d]] + factors[d] * v
+            y[rows[a]], y[rows[b]], y[rows[c]], y[rows[d]] = at_a, at_b, at_c, at_d
 
 
-@kernel
-def forward(first, last, factor, r, y):
-    """y = L⁻¹ r within one part.
-
-    Parameters
-    ----------
-    first, last : int
-        The part has the positions first ... last - 1.
-    factor : FactorColumns
-    r : (n,) float64 array
-        Right-hand side.
-    y : (n,) float64 array
-        To fill.
-    """
-    order, starts, rows, factors, part_ends, _ = factor
-    for k in unsigned_range(first, last):
-        y[k] = r[order[k]]
-    for k in unsigned_range(first, last):
-        v = y[k]
-        for e in range(starts[k], part_ends[k]):
-            y[rows[e]] += factors[e] * v
-
-
-@kernel
-def sum_separator_rows(first, last, factor, separator_rows, n_inner, r, y):
-    """What the separator's nodes first ... last - 1 get from the parts, into y.
-
-    Parameters
-    ----------
-    first, last : int
-        Nodes to treat, counted from the start of the separator.
-    factor : FactorColumns
-    separator_rows : FactorRows
-    n_inner : int
-        Position where the separator starts.
-    r : (n,) float64 array
-        Right-hand side.
-    y : (n,) float64 array
-        Filled for the parts; to fill for the separator.
-    """
-    row_starts, row_columns, row_factors = separator_rows
-    for i in range(first, last):
-        s = r[factor.order[n_inner + i]]
-        for e in range(row_starts[i], row_starts[i + 1]):
-            s += row_factors[e] * y[row_columns[e]]
-        y[n_inner + i] = s
-
-
-@kernel(error_model="numpy")
-def substitute_separator(factor, n_inner, r, z, y):
-    """Both substitutions within the separator, from position n_inner on; returns its part of r·z."""
-    _, starts, rows, factors, _, _ = factor
-    n = y.shape[0]
-    for k in range(n_inner, n):
-        v = y[k]
-        for e in range(starts[k], starts[k + 1]):
-            y[rows[e]] += factors[e] * v
-    return _backward(n_inner, n, factor, r, z, y)
-
-
-@kernel(error_model="numpy")
-def backward(first, last, factor, r, z, y):
-    """y and z = L⁻ᵀ D⁻¹ y within one part, positions first ... last - 1; returns its part of r·z."""
-    return _backward(first, last, factor, r, z, y)
-
-
-@helper(error_model="numpy")
-def _backward(first, last, factor, r, z, y):
-    """y and z = L⁻ᵀ D⁻¹ y for positions first ... last - 1; returns their part of r·z."""
-    order, starts, rows, factors, _, inverse_pivots = factor
+@helper(error_model="numpy", fastmath={"contract"})
+def _backward(factor, r, z):
+    """y and z = L⁻ᵀ D⁻¹ y; returns r·z."""
+    order, starts, rows, factors, inverse_pivots, y, _ = factor
     product = 0.0
-    for k in range(last - 1, first - 1, -1):
+    n = np.uint64(order.shape[0])
+    for step in unsigned_range(1, n + _ONE):
+        k = n - step
         s = y[k] * inverse_pivots[k]
-        for e in range(starts[k], starts[k + 1]):
-            s += factors[e] * y[rows[e]]
+        for a in range(starts[k], starts[k + _ONE], _FOUR):
+            b, c, d = a + _ONE, a + _TWO, a + _THREE
+            s += (factors[a] * y[rows[a]] + factors[b] * y[rows[b]]) + (
+                factors[c] * y[rows[c]] + factors[d] * y[rows[d]]
+            )
         y[k] = s
         z[order[k]] = s
         product += s * r[order[k]]

@@ -22,8 +22,16 @@ _kernels: dict[str, Any] = {}
 _njit: Any = numba.njit  # which has more options than it says
 
 
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+def kernel(function: Callable[..., Any] | None = None, *, allocates: bool = True, **options: Any) -> Any:
     """`numba.njit` for a function that Python calls, kept on disk. `options` are numba's, as of `helper`.
+
+    Parameters
+    ----------
+    function : callable
+    allocates : bool
+        Whether it makes arrays. References to arrays are not counted in a kernel that makes none: in a loop whose
+        steps are helpers, counting may take longer than they do.
+    **options
 
     Examples
     --------
@@ -38,7 +46,9 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     array([0.5, 2. ])
     """
     if function is None:
-        return lambda function: kernel(function, **options)
+        return lambda function: kernel(function, allocates=allocates, **options)
+    if not allocates:
+        options["_nrt"] = False
     # Nobody calls it by way of ctypes: one wrapper less to compile.
     compiled = _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
     if compiled is not function:  # as it is where compiling is disabled
@@ -61,6 +71,8 @@ def helper(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if function is None:
         return lambda function: helper(function, **options)
     options.setdefault("forceinline", "inline" not in options)
+    if not options["forceinline"] and "inline" not in options:
+        options["_nrt"] = True  # it may make arrays, whoever calls it
     return _njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
 
 

@@ -1,7 +1,6 @@
 """Random numbers for kernels, from a state that the caller holds: numba's own generator is one for all of a thread.
 
-The numbers are those of the Mersenne Twister (Matsumoto and Nishimura 1998, doi:10.1145/272991.272995) with 53 bits,
-as of `numpy.random.RandomState`.
+The generator is SplitMix64 (Steele, Lea and Flood 2014, doi:10.1145/2660193.2660195).
 """
 
 from __future__ import annotations
@@ -10,41 +9,27 @@ import numpy as np
 
 from porefv.system.kernels import helper
 
-_WORDS, _SHIFT = 624, 397
-_UPPER, _LOWER, _TWIST = 0x80000000, 0x7FFFFFFF, 0x9908B0DF
+_STEP = np.uint64(0x9E3779B97F4A7C15)
+_FIRST_FACTOR = np.uint64(0xBF58476D1CE4E5B9)
+_SECOND_FACTOR = np.uint64(0x94D049BB133111EB)
 
 
 def random_state(seed: int) -> np.ndarray:
-    """(625,) int64: the words of a generator that starts from a seed, and how many of them are used."""
-    words = np.random.RandomState(seed).get_state(legacy=False)["state"]["key"]
-    return np.append(words, _WORDS).astype(np.int64)
+    """(1,) uint64: the state of a generator that starts from a seed."""
+    return np.array([seed], np.uint64)
 
 
 @helper
 def uniform(state):
-    """The next random number, 0 <= x < 1; `state` (625,) moves on."""
-    return ((_word(state) >> 5) * 67108864.0 + (_word(state) >> 6)) / 9007199254740992.0  # (2²⁶ a + b) / 2⁵³
+    """The next random number, 0 <= x < 1; `state` (1,) moves on."""
+    return np.float64(_word(state) >> np.uint64(11)) / 9007199254740992.0  # 2⁵³
 
 
 @helper
 def _word(state):
-    """The next word of 32 bits."""
-    if state[_WORDS] == _WORDS:
-        _renew(state)
-    y = state[state[_WORDS]]
-    state[_WORDS] += 1
-    y ^= y >> 11
-    y ^= (y << 7) & 0x9D2C5680
-    y ^= (y << 15) & 0xEFC60000
-    return y ^ (y >> 18)
-
-
-@helper
-def _renew(state):
-    """Replace all words by the next ones."""
-    for i in range(_WORDS):
-        following = state[i + 1] if i + 1 < _WORDS else state[0]
-        y = (state[i] & _UPPER) | (following & _LOWER)
-        distant = state[i + _SHIFT] if i + _SHIFT < _WORDS else state[i + _SHIFT - _WORDS]
-        state[i] = distant ^ (y >> 1) ^ (_TWIST if y & 1 else 0)
-    state[_WORDS] = 0
+    """The next word of 64 bits."""
+    state[0] += _STEP
+    x = state[0]
+    x = (x ^ (x >> np.uint64(30))) * _FIRST_FACTOR
+    x = (x ^ (x >> np.uint64(27))) * _SECOND_FACTOR
+    return x ^ (x >> np.uint64(31))

@@ -91,6 +91,7 @@ def _build(vertices: Vertices, extent: np.ndarray) -> FoundCells:
         ends=np.empty((capacity, 4), np.int32),
         free=np.empty(capacity, np.int32),
         counts=np.zeros(4, np.int64),
+        **_room_for_cavity(capacity),
     )
     magnitude = float(np.sum(np.abs(points[:n]).max(axis=0) ** 2) + radii[:n].max() ** 2)
     scale = Scale(extent, magnitude + float(np.abs(radii[n:]).max()) ** 2)
@@ -102,10 +103,24 @@ def _build(vertices: Vertices, extent: np.ndarray) -> FoundCells:
             break
         ensure_room_for_cells(len(cells.vertices))
         cells = Cells(*(_with_as_many_zeros(array) for array in cells))
-        marks, ends, free, counts = work
-        work = Workspace(_with_as_many_zeros(marks), _with_as_many_zeros(ends), _with_as_many_zeros(free), counts)
+        work = work._replace(
+            marks=_with_as_many_zeros(work.marks),
+            ends=_with_as_many_zeros(work.ends),
+            free=_with_as_many_zeros(work.free),
+            **_room_for_cavity(len(cells.vertices)),
+        )
     used = insertion.cells_used(work)
     return FoundCells(cells.vertices[:used], cells.neighbours[:used], cells.planes[:used])
+
+
+def _room_for_cavity(capacity: int) -> dict[str, np.ndarray]:
+    """Arrays of `Workspace` for the largest cavity there may be; what is not used is never touched."""
+    return {
+        "found": np.empty(capacity, np.int32),
+        "cavity": np.empty(capacity, np.int32),
+        "boundary": np.empty(2 * capacity + 2, np.int32),
+        "facets": np.empty(2 * capacity + 2, np.int8),
+    }
 
 
 def _with_as_many_zeros(array: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from porefv.system.growing_arrays import doubled
 from porefv.system.kernels import helper, kernel
 from porefv.tessellation.predicates import EPSILON, determinant, in_conflict, minors, power_centre, row, side
 
@@ -50,12 +49,21 @@ class Workspace(NamedTuple):
         Stack of free cells.
     counts : (4,) int64 array
         How many cells are in the stack, first cell that was never used, last new cell, how many spheres are inserted.
+    found, cavity : (m,) int32 arrays
+        Cells in conflict with a sphere: those whose neighbours are still to be looked at, and all of them.
+    boundary : (2 m + 2,) int32, facets : (2 m + 2,) int8 arrays
+        Facets of the cavity's boundary: their cells, and the places in these. Cells that are joined to each other have
+        no more facets than that.
     """
 
     marks: np.ndarray
     ends: np.ndarray
     free: np.ndarray
     counts: np.ndarray
+    found: np.ndarray
+    cavity: np.ndarray
+    boundary: np.ndarray
+    facets: np.ndarray
 
 
 class Scale(NamedTuple):
@@ -112,7 +120,7 @@ def start(q, vertices, triangulation, work, scale):
     work.counts[_INSERTED] = 1
 
 
-@kernel
+@kernel(allocates=False)
 def insert(order, first, vertices, triangulation, work, scale):
     """Insert the spheres order[first:] into `Cells`; returns how many were done (fewer where the arrays are full).
 
@@ -129,12 +137,8 @@ def insert(order, first, vertices, triangulation, work, scale):
     """
     _, points, weights = vertices
     cells, neighbours, planes, bounds = triangulation
-    marks, ends, free, counts = work
+    marks, ends, free, counts, stack, dead, boundary_cells, boundary_facets = work
     capacity = cells.shape[0]
-    stack = np.empty(1024, np.int32)
-    boundary_cells = np.empty(1024, np.int32)
-    boundary_facets = np.empty(1024, np.int8)
-    dead = np.empty(1024, np.int32)
     for k in range(first, order.shape[0]):
         q = order[k]
         hq = (
@@ -158,15 +162,8 @@ def insert(order, first, vertices, triangulation, work, scale):
         while n_stack > 0:
             n_stack -= 1
             c = stack[n_stack]
-            if n_dead + 1 >= dead.shape[0]:
-                dead = doubled(dead)
             dead[n_dead] = c
             n_dead += 1
-            if n_stack + 4 >= stack.shape[0]:
-                stack = doubled(stack)
-            if n_boundary + 4 >= boundary_cells.shape[0]:
-                boundary_cells = doubled(boundary_cells)
-                boundary_facets = doubled(boundary_facets)
             for i in range(4):
                 u = neighbours[c, i]
                 inside = False
@@ -253,9 +250,6 @@ def insert(order, first, vertices, triangulation, work, scale):
             counts[_FREE] += 1
         counts[_INSERTED] += 1
     return order.shape[0]
-
-
-# The steps for one cell are inlined: numba would count references to all the arrays at every call.
 
 
 @helper(inline="always")
