@@ -185,9 +185,7 @@ def test_a_file_of_version_1_is_loaded(coupled, name):
     assert again.conductance == HydraulicRadius()
     assert (again.effort.steps, again.effort.meshes, again.scheme) == (40, 1, "implicit-drag")
     for _ in range(2):
-        # They may have rounded differently on another processor.
-        assert_allclose(again.pressure, coupling.pressure, rtol=1e-6)
-        assert_allclose(again.grains.positions, coupling.grains.positions, rtol=1e-9)
+        assert_same_but_for_the_solver(again, coupling)
         for run in (coupling, again):
             run.run(20)
 
@@ -196,8 +194,13 @@ def test_a_file_of_version_1_of_another_model_needs_it(coupled):
     path = FILES / "version_1_of_another_model.npz"
     with pytest.raises(InputError, match="conductance model 'slits', which is not one of porefv"):
         checkpoint.load(path)
-    again, coupling = checkpoint.load(path, conductance=Slits()), coupled(Slits())
-    assert_allclose(again.pressure, coupling.pressure, rtol=1e-6)
+    assert_same_but_for_the_solver(checkpoint.load(path, conductance=Slits()), coupled(Slits()))
+
+
+def assert_same_but_for_the_solver(one, other):
+    # Pressures are found to a tolerance, of their power; the solver had another preconditioner then.
+    assert np.linalg.norm(one.pressure - other.pressure) < 0.01 * np.linalg.norm(other.pressure)
+    assert_allclose(one.grains.positions, other.grains.positions, rtol=1e-5)
 
 
 def test_a_newer_format_says_so(rewritten, tmp_path):
