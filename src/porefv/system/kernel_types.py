@@ -48,7 +48,7 @@ def _text(kind: Any) -> str:
         return f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}({fields})"
     if isinstance(kind, types.BaseTuple):
         return f"({', '.join(_text(field) for field in kind)},)"
-    if isinstance(kind, types.Record):
+    if isinstance(kind, types.Record) and kind.size == sum(field.type.bitwidth // 8 for field in kind.fields.values()):
         return f"record({', '.join(f'{name}={_text(field.type)}' for name, field in kind.fields.items())})"
     return "npy_rng" if kind == types.npy_rng else str(kind)
 
