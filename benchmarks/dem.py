@@ -97,7 +97,7 @@ def sample(grains: int, material: Material = MATERIAL, **options) -> DEM:
 
 def measure(grains: int) -> tuple[float, int, float]:
     """Seconds of a step, contacts, seconds per grain to list pairs."""
-    dem = sample(grains, threads=int(os.environ["NUMBA_NUM_THREADS"]))
+    dem = sample(grains)
     steps = max(5, 1_000_000 // grains)
     dem.run(steps)
     best = np.inf

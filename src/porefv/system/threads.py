@@ -32,8 +32,8 @@ _BLOCKS_EACH = 4
 # processors are busy with other processes. This thread then works alone, for so many times as long, or so many seconds
 # at most, for such waits to be a small part of all.
 _HELD_UP = 1e-3
-_ALONE = 30.0
-_MOST_ALONE = 1.0
+_ALONE = 100.0
+_MOST_ALONE = 2.0
 
 _limit: int | None = None
 _alone_until = 0.0
