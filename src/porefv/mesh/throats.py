@@ -11,6 +11,7 @@ import numpy as np
 from porefv.mesh.facet_kernels import row_sums, sector_angles
 from porefv.mesh.inscribed_circles import Circles, TiedCircles, circles_of_throats, inscribed_circles
 from porefv.mesh.uniting import tied_facets
+from porefv.system.kernels import read_only
 from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.system.threads import for_rows
 
@@ -189,7 +190,7 @@ class Throats(FixedInputs):
 
     def wetted_surfaces(self, slip: np.ndarray) -> np.ndarray:
         """(t,): Σγ^k of each throat over its spheres and no-slip walls [m²]."""
-        return self._total(row_sums(self.mesh.facets.wetted_surfaces(slip)))
+        return self._total(row_sums(read_only(self.mesh.facets.wetted_surfaces(slip))))
 
     def inscribed_radii(self, slip: np.ndarray) -> np.ndarray:
         """(t,): radius of the circle in the throat's plane tangent to its spheres and no-slip walls [m].

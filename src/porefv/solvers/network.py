@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from porefv.system.kernels import kernel, unsigned_range
+from porefv.system.kernels import kernel, read_only, unsigned_range
 from porefv.system.threads import for_blocks, for_rows
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ class Network:
         """
         if number is None:
             number = np.arange(len(leaks), dtype=np.int32)
+        pairs, weights = read_only(pairs), read_only(weights)
         starts = np.zeros(len(leaks) + 1, np.int64)
         _count(pairs, weights, number, starts)
         np.cumsum(starts, out=starts)

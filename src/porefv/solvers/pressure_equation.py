@@ -10,7 +10,7 @@ import numpy as np
 from porefv.errors import ComputationError
 from porefv.solvers.network import Network
 from porefv.solvers.solver import TOLERANCE, SolverReport, solve_split
-from porefv.system.kernels import kernel
+from porefv.system.kernels import kernel, read_only
 from porefv.system.union_find import join
 
 
@@ -95,9 +95,13 @@ def solve_network(
     return NetworkSolution(pressure, isolated, report, rest)
 
 
+def reached(pairs: np.ndarray, weights: np.ndarray, sources: np.ndarray) -> np.ndarray:
+    """(n,) bool: nodes that links (t, 2) of positive weight (t,) join to a source, (n,) bool."""
+    return _reached(read_only(pairs), read_only(weights), sources)
+
+
 @kernel
-def reached(pairs, weights, sources):
-    """(n,) bool: nodes that links of positive weight join to a source."""
+def _reached(pairs, weights, sources):
     n = sources.shape[0]
     parent = np.arange(n)
     for t in range(pairs.shape[0]):
@@ -153,7 +157,7 @@ def free_network(
     number[~free] = -1
     rhs = sources[free]
     leaks = np.zeros(len(rhs))
-    _leak(pairs, conductances, pressure, number, leaks, rhs)
+    _leak(read_only(pairs), read_only(conductances), pressure, number, leaks, rhs)
     return Network.from_links(pairs, conductances, leaks, number), rhs
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from porefv.system.kernel_files import KernelFiles
 
-__all__ = ["all_kernels", "helper", "kernel", "unsigned_range"]
+__all__ = ["all_kernels", "helper", "kernel", "read_only", "unsigned_range"]
 
 _kernels: dict[str, Any] = {}
 _njit: Any = numba.njit  # which has more options than it says
@@ -83,6 +83,13 @@ def unsigned_range(first: int, last: int) -> range:
     Arithmetic with such a number and one with sign gives a float.
     """
     return range(np.uint64(first), np.uint64(last))  # type: ignore[arg-type]
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """A view that is read-only: a kernel takes the same type, whether the array is or not."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def all_kernels() -> dict[str, Any]:

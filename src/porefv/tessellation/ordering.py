@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from porefv.system.kernels import helper, kernel
+from porefv.system.kernels import helper, kernel, read_only
 
 _BITS = 20
 
@@ -18,7 +18,7 @@ def morton_codes(points: np.ndarray) -> np.ndarray:
     """(n,) int64: Morton code of each point, its coordinates on a 2^20 grid with their bits interleaved."""
     lower = points.min(axis=0)
     size = float((points.max(axis=0) - lower).max())
-    return _interleave(points, lower, ((1 << _BITS) - 1) / size if size > 0.0 else 0.0)
+    return _interleave(read_only(points), lower, ((1 << _BITS) - 1) / size if size > 0.0 else 0.0)
 
 
 @kernel
