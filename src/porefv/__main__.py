@@ -1,8 +1,6 @@
 """`python -m porefv` is the command `porefv`."""
 
-import sys
-
-from porefv.cli.program import main
+from porefv.cli.program import command
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

@@ -1,5 +1,5 @@
 """The command line."""
 
-from porefv.cli.program import main
+from porefv.cli.program import command, main
 
-__all__ = ["main"]
+__all__ = ["command", "main"]

@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NoReturn
 
 from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
 from porefv.errors import PorefvError
@@ -50,6 +50,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "the scene and what the same command prints with POREFV_DEBUG=1 in the environment.",
             1,
         )
+
+
+def command() -> NoReturn:
+    """The command `porefv`: run it, and end the process.
+
+    Everything is written by then. To take down what has been loaded would take as long again as a small computation.
+    """
+    status = main()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        sys.exit(status)  # Python says what it could not write
+    os._exit(status)
 
 
 @contextmanager
