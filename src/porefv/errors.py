@@ -7,10 +7,34 @@ FORCE_OPTION = "force=True (--force on the command line)"
 RESUME_OPTION = "resume=True (--resume on the command line)"
 
 
+# Most characters of a message: what is quoted in it may be of any length.
+_MOST = 2000
+
+
+def printable(text: str, most: int | None = None) -> str:
+    r"""A text with what is not printable escaped, line breaks excepted, and cut in its middle if it is too long.
+
+    Names of files and contents of files may hold control characters, which would steer the terminal.
+
+    >>> printable("a\x1b[31mb")
+    'a\\x1b[31mb'
+    """
+    if most is not None and len(text) > most:
+        text = f"{text[: most // 2]} ... {text[-most // 2 :]}"
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape", "surrogatepass").decode() for c in text
+    )
+
+
 class PorefvError(Exception):
-    """Base of all errors raised on purpose by porefv."""
+    """Base of all errors raised on purpose by porefv. Its text is printable, and bounded in length."""
 
     exit_status = 1
+
+    def __str__(self) -> str:
+        return printable(super().__str__(), _MOST)
 
 
 class InputError(PorefvError, ValueError):

@@ -6,7 +6,14 @@ from numpy.testing import assert_array_equal
 from porefv import ConductanceModel, InputError, Walls
 from porefv.coupling.coupling import Coupling
 from porefv.dem.dem import DEM
-from porefv.simulation.run_record import RunRecord, read_record
+from porefv.simulation.run_record import RunRecord, StageSpan, read_record
+from porefv.simulation.series import SERIES, SeriesMark
+
+MARKS = {SERIES: SeriesMark(0)}
+
+
+def record_of(dem):
+    return RunRecord({"stages": [{}]}, None, dem.box.size.tolist(), spans=[StageSpan("only", 0, 0.0)])
 
 
 class Slits(ConductanceModel):
@@ -21,8 +28,7 @@ def test_a_coupled_state_is_loaded_with_its_conductance_model(reference, tmp_pat
     dem = DEM(reference("n25_s1"))
     coupling = Coupling(dem, Walls.along("z"), conductance=model)
     coupling.run(3)
-    record = RunRecord({}, None, dem.box.size.tolist())
-    record.save(tmp_path, dem, coupling, False, {}, {})
+    record_of(dem).save(tmp_path, dem, coupling, False, MARKS, {})
     grains, again = read_record(tmp_path).load(tmp_path, coupling.conductance)
     assert again.grains is grains and again.conductance == coupling.conductance
     assert_array_equal(again.pressure, coupling.pressure)
@@ -34,7 +40,7 @@ def test_a_coupled_state_is_loaded_with_its_conductance_model(reference, tmp_pat
 def test_a_state_of_grains_alone_is_loaded(reference, tmp_path):
     dem = DEM(reference("n25_s1"))
     dem.run(3)
-    RunRecord({}, None, dem.box.size.tolist()).save(tmp_path, dem, None, False, {}, {})
+    record_of(dem).save(tmp_path, dem, None, False, MARKS, {})
     grains, coupling = read_record(tmp_path).load(tmp_path, Slits())
     assert coupling is None
     assert_array_equal(grains.positions, dem.positions)

@@ -21,8 +21,8 @@ from porefv.packing.box import WALLS
 from porefv.scenes.simulation_scene import SimulationScene
 from porefv.simulation import measurements, simulate
 from porefv.simulation.measurements import layer_stresses
+from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import read_record
-from porefv.simulation.series import read_profiles, read_series
 from porefv.system.progress import Progress
 
 ROOT = Path(__file__).parents[2]
@@ -463,8 +463,8 @@ def test_example_scenes_run(example, tmp_path):
     assert wet["momentum_residual"].max() < 1e-10
     if example.stem != "triaxial":
         measured = read_record(tmp_path / "results").permeability
-        assert [entry["when"] for entry in measured] == ["before", "after"]
-        assert measured[1]["permeability"] < measured[0]["permeability"]
+        assert [entry.when for entry in measured] == ["before", "after"]
+        assert measured[1].permeability < measured[0].permeability
 
 
 def test_the_page_names_every_column_and_its_scenes_are_sound():

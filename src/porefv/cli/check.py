@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.text import count_text, path_text, range_text, rows_text, vector_text, walls_text
+from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 
 if TYPE_CHECKING:
     from porefv.packing.packing import Packing
@@ -37,19 +37,19 @@ def run(options: argparse.Namespace) -> None:
         simulation = SimulationScene.read(options.scene)
         with progress.stage("validation"):
             grains = check(simulation)
-        print(simulate.scene_text(simulation, grains))
+        say(simulate.scene_text(simulation, grains))
     elif "grains" in keys:
         from porefv.cli import pack
         from porefv.scenes.packing_scene import PackingScene
 
-        print(pack.scene_text(PackingScene.read(options.scene)))
+        say(pack.scene_text(PackingScene.read(options.scene)))
     else:
         from porefv.scenes.flow_scene import FlowScene
 
         scene = FlowScene.read(options.scene)
         with progress.stage("validation"):
             packing = scene.check()
-        print(scene_text(scene, packing))
+        say(scene_text(scene, packing))
 
 
 def scene_text(scene: FlowScene, packing: Packing) -> str:

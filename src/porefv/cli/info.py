@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.text import count_text, path_text, range_text, rows_text, vector_text, walls_text
+from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 from porefv.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ def run(options: argparse.Namespace) -> None:
     if is_simulation(options.results):
         from porefv.cli.simulate import outcome_text
 
-        print(outcome_text(read_record(options.results), options.results))
+        say(outcome_text(read_record(options.results), options.results))
     else:
-        print(summary_text(read(options.results)))
+        say(summary_text(read(options.results)))
 
 
 def summary_text(results: Results) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
+from porefv.cli.text import say
 from porefv.errors import counted
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def run(options: argparse.Namespace) -> None:
     announce_compilation(progress)
     packing = scene.pack(force=options.force, progress=progress)
     if not options.quiet:
-        print(outcome_text(packing, scene.output))
+        say(outcome_text(packing, scene.output))
 
 
 def outcome_text(packing: Packing, output: Path) -> str:

@@ -4,52 +4,62 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
 from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
-from porefv.errors import PorefvError
+from porefv.cli.text import flush
+from porefv.errors import PorefvError, printable
 from porefv.system import memory
+from porefv.system.signals import Terminated, end, handled
 from porefv.system.version import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input) or 130 (interrupted)."""
-    try:
-        options = _parser().parse_args(arguments)
-        with _warnings_in_a_line(quiet=getattr(options, "quiet", False)):
-            if options.command is not info.run:
-                memory.ensure_libraries()
-            options.command(options)
-        sys.stdout.flush()
-        return 0
-    except PorefvError as error:
-        return _fail(str(error), error.exit_status)
-    except KeyboardInterrupt as interruption:
-        return _fail(str(interruption) or "interrupted; nothing was written", 130)
-    except BrokenPipeError:
-        # Whoever read our output has gone (porefv info results | head): no complaint on the way out.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except ModuleNotFoundError as error:
-        return _fail(f"the installation is incomplete: {error}. Install porefv again with pip", 1)
-    except ImportError as error:  # of a library that is there
-        return _fail(
-            f"a library cannot be loaded: {error}. Allow more memory (ulimit -v), or install porefv again with pip", 1
-        )
-    except MemoryError:
-        return _fail("not enough memory; ask for less (quantities, vtk), or use a larger machine", 1)
-    except Exception as error:  # the user gets a line, the developer a traceback
-        if os.environ.get("POREFV_DEBUG"):
-            raise
-        return _fail(
-            f"unexpected {type(error).__name__}: {error}\nThis is a defect of porefv. Please report it, with "
-            "the scene and what the same command prints with POREFV_DEBUG=1 in the environment.",
-            1,
-        )
+    """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input), 130 (interrupted) or 143 (SIGTERM)."""
+    with handled(lambda number, _: end(number), signal.SIGTERM):
+        try:
+            options = _parser().parse_args(arguments)
+            with _warnings_in_a_line(quiet=getattr(options, "quiet", False)):
+                if options.command is not info.run:
+                    memory.ensure_libraries()
+                options.command(options)
+            return 0
+        except (Exception, KeyboardInterrupt, Terminated) as error:
+            return _failed(error)
+
+
+def _failed(error: BaseException) -> int:
+    """Say what went wrong, and give the exit status."""
+    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt | Terminated):
+        error = error.__cause__  # it came within a kernel, as that handed its arrays over
+    match error:
+        case PorefvError():
+            return _fail(str(error), error.exit_status)
+        case KeyboardInterrupt():
+            return _fail(str(error) or "interrupted; nothing was written", 130)
+        case Terminated():
+            return _fail(str(error) or "terminated; nothing was written", 143)
+        case BrokenPipeError():
+            return 0  # whoever read our output has gone (porefv info results | head)
+        case ModuleNotFoundError():
+            return _fail(f"the installation is incomplete: {error}. Install porefv again with pip", 1)
+        case ImportError():  # of a library that is there
+            remedy = "Allow more memory (ulimit -v), or install porefv again with pip"
+            return _fail(f"a library cannot be loaded: {error}. {remedy}", 1)
+        case MemoryError():
+            return _fail("not enough memory; ask for less (quantities, vtk), or use a larger machine", 1)
+    if os.environ.get("POREFV_DEBUG"):  # the user gets a line, the developer a traceback
+        raise error
+    return _fail(
+        f"unexpected {type(error).__name__}: {printable(str(error), 500)}\nThis is a defect of porefv. Please report "
+        "it, with the scene and what the same command prints with POREFV_DEBUG=1 in the environment.",
+        1,
+    )
 
 
 def command() -> NoReturn:
@@ -57,26 +67,46 @@ def command() -> NoReturn:
 
     Everything is written by then. To take down what has been loaded would take as long again as a small computation.
     """
-    status = main()
+    _open_closed_streams()
     try:
-        sys.stdout.flush()
+        status: Any = main()
+    except SystemExit as ended:  # argparse's, after help or the usage
+        status = ended.code
+    try:
+        flush()
         sys.stderr.flush()
+    except PorefvError as error:
+        status = _failed(error)
     except OSError:
-        sys.exit(status)  # Python says what it could not write
-    os._exit(status)
+        pass  # nobody can be told, but the status still says it
+    os._exit(status if isinstance(status, int) else 0)
+
+
+def _open_closed_streams() -> None:
+    """Have numbers 0 to 2 taken where the process was started without, so that no file that is written gets them."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - for as long as the process lives
 
 
 @contextmanager
 def _warnings_in_a_line(quiet: bool) -> Iterator[None]:
     """Say warnings as errors are said, or not at all."""
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: None if quiet else print(f"porefv: {message}", file=sys.stderr)
+        warnings.showwarning = lambda message, *_: None if quiet else _complain(f"porefv: {message}")
         yield
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"porefv: error: {message}", file=sys.stderr)
+    _complain(f"porefv: error: {message}")
     return status
+
+
+def _complain(line: str) -> None:
+    with suppress(OSError, ValueError):  # where nobody can be told, the status still says it
+        print(printable(line), file=sys.stderr)
 
 
 class _CommandParser(argparse.ArgumentParser):
@@ -88,13 +118,16 @@ class _CommandParser(argparse.ArgumentParser):
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return known, unknown
 
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, 500))
+
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="porefv",
         description="Packings of spheres, and flow through them: permeability, pressures, forces on every grain.",
         epilog="A scene says what is wanted, and only that is computed. "
-        "Exit status: 0 done, 1 the computation failed, 2 bad input.",
+        "Exit status: 0 done, 1 the computation failed, 2 bad input, 130 interrupted, 143 terminated.",
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_CommandParser)

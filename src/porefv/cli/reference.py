@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
+from porefv.cli.text import say
 from porefv.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from porefv.resolved.refinement import STAGES, Options, require_ngsolve, stokes_reference
     from porefv.scenes.flow_scene import FlowScene
+    from porefv.system.atomic_files import locked
     from porefv.system.progress import Progress
 
     require_ngsolve()
@@ -42,22 +44,21 @@ def run(options: argparse.Namespace) -> None:
     scene = FlowScene.read(options.scene)
     directory = scene.output.directory
     target = options.out or directory.with_name(f"{directory.name}_stokes.json")
-    if target.exists() and not options.force:
-        raise InputError(f"{target} exists already: choose another with --out, or add --force")
-    if not target.absolute().parent.is_dir():
-        if options.out:
-            raise InputError(f"cannot write {target}: {target.parent} is not a directory")
-        target.parent.mkdir(parents=True)
-    mesh = scene.pore_mesh()
-    progress = Progress(STAGES, quiet=options.quiet)
-    reference = stokes_reference(
-        mesh, scene.walls, scene.fluid.viscosity, fineness,
-        name=options.scene.stem, progress=progress, threads=options.threads or 1,
-    )  # fmt: skip
-    reference.write(target)
+    if options.out and not target.absolute().parent.is_dir():
+        raise InputError(f"cannot write {target}: {target.parent} is not a directory")
+    with locked(target):
+        if target.exists() and not options.force:
+            raise InputError(f"{target} exists already: choose another with --out, or add --force")
+        mesh = scene.pore_mesh()
+        progress = Progress(STAGES, quiet=options.quiet)
+        reference = stokes_reference(
+            mesh, scene.walls, scene.fluid.viscosity, fineness,
+            name=options.scene.stem, progress=progress, threads=options.threads or 1,
+        )  # fmt: skip
+        reference.write(target)
     if not options.quiet:
-        print(comparison_text(reference, scene.pore_flow(mesh)))
-        print(f"resolved flow in {target}")
+        say(comparison_text(reference, scene.pore_flow(mesh)))
+        say(f"resolved flow in {target}")
 
 
 def comparison_text(reference: StokesReference, flow: PoreFlow) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
+from porefv.cli.text import say
 from porefv.errors import InputError, counted
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
     announce_compilation(progress)
     directory = simulate.run(scene, force=options.force, resume=options.resume, progress=progress)
     if not options.quiet:
-        print(outcome_text(read_record(directory), directory))
+        say(outcome_text(read_record(directory), directory))
 
 
 def outcome_text(record: RunRecord, directory: Path) -> str:
@@ -52,8 +53,7 @@ def outcome_text(record: RunRecord, directory: Path) -> str:
         lines.append(f"{counted(len(record.spans), 'stage')}, {point.time:.6g} s in {steps}; {record.seconds:.2f} s")
     for found in record.permeability:
         lines.append(
-            f"permeability {found['permeability']:.4g} m², porosity {found['porosity']:.4f} "
-            f"{found['when']} {found['stage']}"
+            f"permeability {found.permeability:.4g} m², porosity {found.porosity:.4f} {found.when} {found.stage}"
         )
     return "\n".join([*lines, f"results in {directory}"])
 

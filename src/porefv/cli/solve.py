@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
-from porefv.cli.text import count_text, path_text
+from porefv.cli.text import count_text, path_text, say
 
 if TYPE_CHECKING:
     from porefv.results.reading import Results
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> None:
     announce_compilation(progress)
     directory = scene.solve(force=options.force, progress=progress)
     if not options.quiet:
-        print(outcome_text(read(directory)))
+        say(outcome_text(read(directory)))
 
 
 def outcome_text(results: Results) -> str:

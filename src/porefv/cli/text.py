@@ -3,9 +3,54 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
+
+from porefv.errors import PorefvError, printable
+
+
+def say(text: str) -> None:
+    """Print a text on standard output. What is not printable in it, or not known to the output's encoding, is escaped.
+
+    Texts hold names of files, and what files say.
+
+    Raises
+    ------
+    PorefvError
+        If the output cannot be written to.
+    BrokenPipeError
+        If whoever read it has gone.
+    """
+    if sys.stdout is None:
+        raise _no_output("it is closed")
+    encoding = sys.stdout.encoding or "utf-8"
+    try:
+        print(printable(text).encode(encoding, "backslashreplace").decode(encoding))
+    except OSError as error:
+        _drop_output()
+        raise error if isinstance(error, BrokenPipeError) else _no_output(error.strerror) from None
+    flush()
+
+
+def flush() -> None:
+    """Write what is still to be written on standard output; errors as `say`."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        _drop_output()
+        raise error if isinstance(error, BrokenPipeError) else _no_output(error.strerror) from None
+
+
+def _drop_output() -> None:
+    """What is still to be written goes nowhere, so that it is not tried again when the process ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _no_output(reason: str | None) -> PorefvError:
+    return PorefvError(f"cannot write to standard output: {reason}. Files that were to be written are complete")
 
 
 def walls_text(walls: Mapping[str, Mapping[str, Any]]) -> str:

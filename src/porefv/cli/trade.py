@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from porefv.cli.options import add_run_options
+from porefv.cli.text import say
 from porefv.comparison.methods import RESOLVED_UP_TO
+from porefv.errors import printable
 
 
 def register(commands: Any) -> None:
@@ -35,10 +37,10 @@ def run(options: argparse.Namespace) -> None:
     target = options.out or directory.with_name(f"{directory.name}_trade")
     if options.threads:
         os.environ["NUMBA_NUM_THREADS"] = str(options.threads)
-    say = None if options.quiet else (lambda name: print(f"  {name} ...", file=sys.stderr, flush=True))
+    report = None if options.quiet else (lambda name: print(printable(f"  {name} ..."), file=sys.stderr, flush=True))
     with atomic_directory(target, force=options.force) as folder:
-        found = compare(options.scene, resolved=options.resolved, report=say)
+        found = compare(options.scene, resolved=options.resolved, report=report)
         save(found, folder)
     if not options.quiet:
-        print(table(found))
-        print(f"table and picture in {target}")
+        say(table(found))
+        say(f"table and picture in {target}")

@@ -58,6 +58,11 @@ class CouplingState:
         ):
             if found not in (0, most):
                 raise ValueError(f"{name} is of {found}, not of 0 or {most}")
+        if self.scheme not in ("implicit-drag", "semi-implicit"):
+            raise ValueError(f"there is no scheme {self.scheme!r}")
+        for name in ("mesh_centres", "mesh_radii", "mesh_box", "pressure", "rate", "products", "factor_mobilities"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name} is not finite")
 
     @classmethod
     def of(cls, packing: Packing, free: int, scheme: str, drag_number: float | None) -> CouplingState:

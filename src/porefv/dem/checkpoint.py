@@ -84,6 +84,10 @@ class Settings:
     step: float
     ranges: int
 
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.gravity).all() and 0.0 <= self.damping < 1.0 and 0.0 < self.step < np.inf):
+            raise ValueError("gravity, damping or step is out of range")
+
 
 def save(dem: DEM, path: str | PathLike[str]) -> None:
     """Write the state; a file that exists is replaced, when the new one is complete.
@@ -143,6 +147,7 @@ def unpack(content: Arrays, path: str | PathLike[str]) -> DEM:
         numbers = header["numbers"]
         settings = state_files.restored(Settings, content, numbers)
         state = state_files.restored(GrainState, content, numbers, {"s": settings.ranges})
+        state.check()
         divide_into_ranges(state)
         material = Material(**header["material"])
         plates = {

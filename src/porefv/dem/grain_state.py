@@ -215,3 +215,45 @@ class GrainState:
 
     def __len__(self) -> int:
         return len(self.order)
+
+    def check(self) -> None:
+        """Raise ValueError unless kernels can take the state: no index leads out of an array, and numbers are finite.
+
+        Dtypes and shapes are those of the fields. Ranges are not looked at: whoever loads a state makes them anew.
+        """
+        n, motion, pairs, members = len(self), self.grains.motion, self.pairs, self.wall_pairs.members
+        everyone = np.arange(n)
+        _must(n > 0, "there are no grains")
+        _must(np.array_equal(np.sort(self.order), everyone), "order is no numbering of the grains")
+        _must(np.array_equal(self.rank[self.order], everyone), "rank is not the inverse of order")
+        i, j = pairs.grains.T.astype(np.int64)
+        _must(bool(((i >= 0) & (i < j) & (j < n)).all()), "pairs_grains are not pairs of two grains")
+        _must(bool((np.diff(i * n + j) > 0).all()), "pairs_grains are not sorted")
+        _must(np.array_equal(pairs.starts, np.searchsorted(i, np.arange(n + 1))), "pairs_starts are not those of pairs")
+        _must(np.array_equal(pairs.others, j), "pairs_others are not those of pairs")
+        grain, wall = members.T.astype(np.int64)
+        inside = (grain >= 0) & (grain < n) & (wall >= 0) & (wall < 6)
+        _must(bool(inside.all()), "wall_pairs_members are not pairs of a grain and a wall")
+        _must(bool((np.diff(grain * 6 + wall) > 0).all()), "wall_pairs_members are not sorted")
+        for name, numbers in (
+            ("grains_motion", motion), ("grains_inverse_mass", self.grains.inverse_mass),
+            ("grains_inverse_inertia", self.grains.inverse_inertia), ("applied", self.applied),
+            ("pairs_stiffness", pairs.stiffness), ("pairs_shear", pairs.shear),
+            ("wall_pairs_stiffness", self.wall_pairs.stiffness), ("wall_pairs_shear", self.wall_pairs.shear),
+            ("walls_places", self.walls.places), ("walls_velocities", self.walls.velocities),
+            ("walls_top_speeds", self.walls.top_speeds), ("walls_friction", self.walls.friction),
+            ("walls_forces", self.walls.forces), ("walls_yields", self.walls.yields),
+            ("listing_centres", self.listing.centres), ("listing_walls", self.listing.walls),
+            ("listing_slack", self.listing.slack), ("work", self.work), ("applied_work", self.applied_work),
+            ("time", self.time),
+        ):  # fmt: skip
+            _must(bool(np.isfinite(numbers).all()), f"{name} is not finite")
+        _must(bool((motion[:, 3] > 0.0).all()), "grains_motion has a radius that is not positive")
+        _must(bool((self.walls.places[::2] < self.walls.places[1::2]).all()), "walls_places make no box")
+        _must(0.0 <= self.listing.slack <= motion[:, 3].min(), "listing_slack is not within a radius")
+        _must(self.steps >= 0, "steps are negative")
+
+
+def _must(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise ValueError(otherwise)

@@ -171,6 +171,9 @@ def read(path: str | PathLike[str], name: str) -> Arrays:
     """
     try:
         with zipfile.ZipFile(path) as archive:
+            # What is written is not packed: what is might unpack to any size.
+            if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+                raise zipfile.BadZipFile("its arrays are packed")
             damaged = archive.testzip()
         if damaged is not None:
             raise zipfile.BadZipFile(f"{damaged} is damaged")

@@ -8,7 +8,7 @@ from pathlib import Path
 from porefv.export.pictures import SIZE, picture
 from porefv.flow.walls import Walls
 from porefv.results.reading import Results
-from porefv.system.atomic_files import atomic_write, picture_target
+from porefv.system.atomic_files import atomic_write, locked, picture_target
 
 
 def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SIZE) -> None:
@@ -27,7 +27,7 @@ def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SI
     title += f"{summary['packing']['spheres']} spheres"
     if "permeability" in summary:
         title += f",  k = {summary['permeability']:.4g} m²"
-    with atomic_write(path) as temporary:
+    with locked(path), atomic_write(path) as temporary:
         picture(
             results.spheres,
             results.pores,

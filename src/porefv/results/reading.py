@@ -13,6 +13,7 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.results.force_table import FORCE_FILES, read_forces
+from porefv.system.atomic_files import put_back
 from porefv.system.optional_imports import load
 
 if TYPE_CHECKING:
@@ -80,6 +81,7 @@ def read(directory: str | PathLike[str]) -> Results:
         If it is not a results directory, or its summary is damaged.
     """
     directory = Path(directory)
+    put_back(directory)
     path = directory / "summary.json"
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))

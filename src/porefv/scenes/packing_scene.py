@@ -29,6 +29,7 @@ from porefv.scenes.material_table import MaterialTable
 from porefv.scenes.shared_tables import BoxFromOriginTable
 from porefv.scenes.table import MadeFrom, Scene, Table
 from porefv.scenes.values import Fraction, Limits, Numbers, ScenePath, Unbalanced, Vector, Whole, key
+from porefv.system.atomic_files import locked
 from porefv.system.progress import Progress
 from porefv.system.version import __version__
 
@@ -224,12 +225,14 @@ class PackingScene(Scene):
         ComputationError
             If the packing does not come out; nothing is written.
         """
-        _check_target(self.output, force)
         progress = progress or Progress(self.stages, quiet=True)
-        with progress.stage("packing"):
-            packing = self.make(progress)
-        with progress.stage("writing"):
-            write_packing(packing, self.output)
+        _check_folder(self.output)
+        with locked(self.output):
+            _check_target(self.output, force)
+            with progress.stage("packing"):
+                packing = self.make(progress)
+            with progress.stage("writing"):
+                write_packing(packing, self.output)
         return packing
 
     def make(self, progress: Progress | None = None) -> Packing:
@@ -281,6 +284,12 @@ def _described(packing: Packing, found: dict[str, str], seed: int) -> Packing:
     return Packing(packing.centres, packing.radii, packing.box, metadata=metadata)
 
 
+def _check_folder(path: Path) -> None:
+    """Refuse a file in a directory that is none, or cannot be written to."""
+    if not (path.absolute().parent.is_dir() and os.access(path.absolute().parent, os.W_OK)):
+        raise InputError(f"cannot write {path}: {path.parent} is not a directory that may be written to")
+
+
 def _check_target(path: Path, force: bool) -> None:
     """Refuse, before anything is computed, a file that cannot be written or replaced."""
     if EXTENSIONS[path.suffix.lower()] == "vtk":
@@ -289,5 +298,3 @@ def _check_target(path: Path, force: bool) -> None:
         raise InputError(f"cannot write {path}: it is a directory")
     if path.exists() and not force:
         raise InputError(f"{path} exists. Choose another file, or replace it with {FORCE_OPTION}")
-    if not (path.absolute().parent.is_dir() and os.access(path.absolute().parent, os.W_OK)):
-        raise InputError(f"cannot write {path}: {path.parent} is not a directory that may be written to")

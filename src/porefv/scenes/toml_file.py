@@ -48,6 +48,8 @@ class SceneSource:
             return cls(tomllib.loads(text), str(path), text)
         except tomllib.TOMLDecodeError as error:
             raise InputError(_unreadable(path, text, str(error))) from None
+        except ValueError as error:  # a number of more digits than Python reads
+            raise InputError(f"{path}: not TOML that can be read: {str(error).partition(';')[0]}") from None
         except RecursionError:
             raise InputError(f"{path}: not TOML that can be read: it is nested too deeply") from None
 

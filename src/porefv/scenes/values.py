@@ -162,7 +162,7 @@ class Choices:
 
 
 class InFolder:
-    """A path, relative to the folder of the scene."""
+    """A path, relative to the folder of the scene; `~` at its start is the home directory."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_after_validator_function(_in_folder, handler.generate_schema(Text))
@@ -181,7 +181,10 @@ def _without_fraction(value: object) -> object:
 
 
 def _in_folder(text: str, info: core_schema.ValidationInfo) -> Path:
-    return (info.context or {}).get("directory", Path()) / text
+    try:
+        return (info.context or {}).get("directory", Path()) / Path(text).expanduser()
+    except RuntimeError:
+        raise ValueError(f"the home directory in {text!r} is not known; write it out") from None
 
 
 def _without_zero_byte(text: str) -> str:

@@ -17,8 +17,8 @@ __getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "check": "porefv.simulation.simulate",
-        "read_profiles": "porefv.simulation.series",
-        "read_series": "porefv.simulation.series",
+        "read_profiles": "porefv.simulation.reading",
+        "read_series": "porefv.simulation.reading",
         "run": "porefv.simulation.simulate",
     },
 )

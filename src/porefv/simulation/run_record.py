@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from os import PathLike
@@ -18,12 +18,16 @@ from porefv.coupling.coupling import Coupling
 from porefv.dem import checkpoint as dry_checkpoint
 from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
-from porefv.simulation.series import FILES
-from porefv.system.atomic_files import atomic_write
+from porefv.simulation.series import FILES, PROFILES, SERIES, SeriesMark
+from porefv.system.atomic_files import atomic_write, finished_name, sync_directory
 from porefv.system.version import __version__
 
-RECORD, FORMAT, VERSION = "simulation.json", "porefv.simulation", 1
+RECORD, FORMAT, VERSION = "simulation.json", "porefv.simulation", 2
 FRAMES = "frames"
+
+# How a run is: files of an earlier one may still be there; it goes on; or how it has ended.
+STARTING, RUNNING = "starting", "running"
+STATUSES = (STARTING, RUNNING, "interrupted", "failed", "complete")
 
 _CHECKPOINT = re.compile(r"checkpoint_\d+\.npz")
 _FRAME = re.compile(r"(grains|walls|contacts|pores)(\.pvd|_\d+\.vt[pu])")
@@ -37,6 +41,9 @@ class StageSpan:
     begin_step: int
     begin: float
     end: float | None = None
+
+    def __post_init__(self) -> None:
+        _must(self.begin_step >= 0 and math.isfinite(self.begin), "a stage begins at no time")
 
 
 @dataclass
@@ -53,8 +60,8 @@ class CheckpointRecord:
         Of the state; the time in s.
     ended : bool
         Whether the last stage that has begun has reached its end.
-    sizes : dict
-        Bytes of the series by file.
+    series : dict
+        How far each series was written, by its file.
     frames : dict
         Time of each frame of the pores by its step.
     """
@@ -64,8 +71,26 @@ class CheckpointRecord:
     step: int
     time: float
     ended: bool
-    sizes: dict[str, int]
+    series: dict[str, SeriesMark]
     frames: dict[int, float]
+
+    def __post_init__(self) -> None:
+        _must(_CHECKPOINT.fullmatch(self.file) is not None, f"no checkpoint is called {self.file!r}")
+        _must(self.step >= 0 and math.isfinite(self.time), "the checkpoint is of no time")
+        _must(set(self.series) <= {SERIES, PROFILES}, "there is no such series")
+        _must(SERIES in self.series and all(mark.size >= 0 for mark in self.series.values()), "a series has no size")
+
+
+@dataclass
+class PermeabilityRecord:
+    """A permeability that was measured [m²]: in which stage, `before` or `after` it, when [s], along which axis."""
+
+    stage: str
+    when: str
+    time: float
+    axis: str
+    porosity: float
+    permeability: float
 
 
 @dataclass
@@ -79,25 +104,31 @@ class RunRecord:
     path : str or None
         Of the scene file.
     status : str
-        running, interrupted, failed or complete.
+        Of `STATUSES`.
     box : list
         Sizes of the box at the start, which strains refer to [m].
     spans : list of StageSpan
-    permeability : list of dict
-        Stage, `before` or `after`, time [s], axis, and the permeability [m²].
+    permeability : list of PermeabilityRecord
     seconds : float
         By the clock.
     checkpoint : CheckpointRecord or None
     """
 
-    scene: Mapping[str, Any]
+    scene: dict[str, Any]
     path: str | None
     box: list[float]
-    status: str = "running"
+    status: str = RUNNING
     spans: list[StageSpan] = field(default_factory=list)
-    permeability: list[dict[str, Any]] = field(default_factory=list)
+    permeability: list[PermeabilityRecord] = field(default_factory=list)
     seconds: float = 0.0
     checkpoint: CheckpointRecord | None = None
+
+    def __post_init__(self) -> None:
+        _must(self.status in STATUSES, f"no run is {self.status!r}")
+        _must(len(self.box) == 3 and all(math.isfinite(size) and size > 0.0 for size in self.box), "the box is none")
+        _must(isinstance(self.scene.get("stages", []), list), "the scene has no stages")
+        _must(len(self.spans) <= len(self.scene.get("stages", [])), "more stages have begun than there are")
+        _must(self.checkpoint is None or bool(self.spans), "there is a checkpoint, and no stage has begun")
 
     def write(self, directory: Path) -> None:
         """Write simulation.json; the one there was is replaced when this one is complete."""
@@ -106,7 +137,7 @@ class RunRecord:
             temporary.write_text(text + "\n", encoding="utf-8")
 
     def save(
-        self, directory: Path, dem: DEM, coupling: Coupling | None, ended: bool, sizes: dict[str, int],
+        self, directory: Path, dem: DEM, coupling: Coupling | None, ended: bool, series: dict[str, SeriesMark],
         frames: dict[int, float],
     ) -> None:  # fmt: skip
         """Write a checkpoint. Until all of it is there, the record tells of the one before.
@@ -118,7 +149,7 @@ class RunRecord:
         dem : DEM
         coupling : Coupling or None
             None: the state is that of the grains alone.
-        ended, sizes, frames
+        ended, series, frames
             As the attributes of `CheckpointRecord`; those of `frames` are times [s].
         """
         file = f"checkpoint_{dem.steps:09d}.npz"
@@ -126,7 +157,7 @@ class RunRecord:
             coupled_checkpoint.save(coupling, directory / file)
         else:
             dry_checkpoint.save(dem, directory / file)
-        self.checkpoint = CheckpointRecord(file, coupling is not None, dem.steps, dem.time, ended, sizes, dict(frames))
+        self.checkpoint = CheckpointRecord(file, coupling is not None, dem.steps, dem.time, ended, series, dict(frames))
         self.write(directory)
         for name in os.listdir(directory):
             if _CHECKPOINT.fullmatch(name) and name != file:
@@ -152,6 +183,8 @@ def read_record(directory: str | PathLike[str]) -> RunRecord:
     InputError
         If there is none, or it is damaged.
     """
+    from pydantic import TypeAdapter, ValidationError
+
     path = Path(directory) / RECORD
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -161,18 +194,26 @@ def read_record(directory: str | PathLike[str]) -> RunRecord:
         writer = content.pop("porefv")
         if version > VERSION:
             raise InputError(f"{path} has format {version}, of porefv {writer}; this one reads formats to {VERSION}")
-        point = content.pop("checkpoint")
-        if point is not None:
-            frames = {int(step): time for step, time in point.pop("frames").items()}
-            point = CheckpointRecord(**point, frames=frames)
-        spans = [StageSpan(**span) for span in content.pop("spans")]
-        return RunRecord(**content, spans=spans, checkpoint=point)
+        point = content.get("checkpoint")
+        if version == 1 and point is not None:
+            point["series"] = {name: {"size": size} for name, size in point.pop("sizes").items()}
+        # As JSON: there a dataclass may be a table, where types are taken strictly.
+        return TypeAdapter(RunRecord).validate_json(json.dumps(content), strict=True)
     except OSError as error:
         raise InputError(f"{directory} holds no results of porefv simulate: {error.strerror}") from None
+    except ValidationError as errors:
+        first = errors.errors(include_url=False, include_context=False, include_input=False)[0]
+        reason = f"{'.'.join(map(str, first['loc'])) or 'it'}: {first['msg']}"
+        raise InputError(f"{path} is damaged ({reason}). Start the run anew, with {FORCE_OPTION}") from None
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is damaged ({error}). Start the run anew, with {FORCE_OPTION}") from None
+
+
+def _must(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise ValueError(otherwise)
 
 
 # ---- the directory ----------------------------------------------------------------------------------------------
@@ -183,6 +224,20 @@ def is_simulation(directory: str | PathLike[str]) -> bool:
     return (Path(directory) / RECORD).is_file()
 
 
+def content_of(directory: Path) -> list[str]:
+    """Names in a directory, without those that a process that was killed has left; none if there is no directory.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return [name for name in os.listdir(directory) if not _is_left_over(name)] if directory.is_dir() else []
+    except OSError as error:
+        raise InputError(f"cannot read {directory}: {error.strerror}") from None
+
+
 def check_directory(directory: Path, force: bool) -> None:
     """Refuse a directory that cannot be written, that holds results unless forced, or other files.
 
@@ -191,8 +246,8 @@ def check_directory(directory: Path, force: bool) -> None:
     InputError
         Before anything is computed.
     """
+    content = content_of(directory)
     try:
-        content = os.listdir(directory) if directory.is_dir() else []
         existing = next(path for path in (directory, *directory.absolute().parents) if path.exists())
     except OSError as error:
         raise InputError(f"cannot write {directory}: {error.strerror}") from None
@@ -209,15 +264,40 @@ def check_directory(directory: Path, force: bool) -> None:
         raise InputError(f"cannot write {directory}: {existing} is not a directory that may be written to")
 
 
-def clear(directory: Path) -> None:
-    """Make the directory, or remove what a simulation has written there, and nothing else; the record goes last."""
+def begin(directory: Path, record: RunRecord) -> None:
+    """Make the directory, or remove what an earlier run has written there, and nothing else.
+
+    The record is replaced first. Whoever finds it until all is removed knows that nothing beside it is this run's.
+    """
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        if not directory.exists():
+            directory.mkdir()
+            sync_directory(directory.parent)
+        record.status = STARTING
+        record.write(directory)
         for path in sorted((directory / FRAMES).glob("*")):
             if _FRAME.fullmatch(path.name):
                 path.unlink()
         names = [name for name in os.listdir(directory) if _CHECKPOINT.fullmatch(name)]
-        for name in (*names, *FILES, RECORD):
+        for name in (*names, *FILES):
             (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write {directory}: {error.strerror}") from None
+
+
+def tidy(directory: Path, checkpoint: CheckpointRecord | None) -> None:
+    """Remove what a process that was killed has left: files that are not complete, and checkpoints of no record."""
+    for folder in (directory, directory / FRAMES):
+        with suppress(OSError):  # what stays does no harm
+            for name in os.listdir(folder):
+                stale = _CHECKPOINT.fullmatch(name) and checkpoint is not None and name != checkpoint.file
+                if stale or _is_left_over(name):
+                    (folder / name).unlink()
+
+
+def _is_left_over(name: str) -> bool:
+    """Whether a name is the temporary one of a file of a run."""
+    finished = finished_name(name)
+    return finished is not None and any(
+        (finished == RECORD, finished in FILES, _CHECKPOINT.fullmatch(finished), _FRAME.fullmatch(finished))
+    )

@@ -10,9 +10,10 @@ import numpy as np
 
 from porefv.errors import InputError, MissingExtraError, counted
 from porefv.packing.box import WALLS
+from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
-from porefv.simulation.series import PROFILES, read_profiles, read_series
-from porefv.system.atomic_files import atomic_write, picture_target
+from porefv.simulation.series import PROFILES
+from porefv.system.atomic_files import atomic_write, locked, picture_target
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ def draw_series(directory: str | PathLike[str], path: str | PathLike[str]) -> No
     """
     path = picture_target(path)
     picture = series_picture(directory)
-    with atomic_write(path) as temporary:
+    with locked(path), atomic_write(path) as temporary:
         picture.savefig(temporary, dpi=150)
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,15 +25,22 @@ from porefv.simulation import measurements
 from porefv.simulation.frames import Frames
 from porefv.simulation.run_record import (
     FRAMES,
+    RUNNING,
+    PermeabilityRecord,
     RunRecord,
     StageSpan,
+    begin,
     check_directory,
-    clear,
+    content_of,
     is_simulation,
     read_record,
+    tidy,
 )
 from porefv.simulation.series import PROFILES, SERIES, Series, copy_tables
+from porefv.system import signals
+from porefv.system.atomic_files import locked
 from porefv.system.progress import Progress
+from porefv.system.signals import Terminated
 from porefv.system.tables import check_table_format
 
 # Most steps at once, and between two looks at whether grains are at rest.
@@ -68,35 +74,43 @@ def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, pr
         Before anything is computed or overwritten, where possible.
     ComputationError
         If the motion runs away, or grains do not come to rest. What was recorded, and the last checkpoint, stay.
-    KeyboardInterrupt
-        When interrupted: at the end of some steps, after a checkpoint; at once when interrupted again.
+    KeyboardInterrupt, Terminated
+        When interrupted, or at SIGTERM: at the end of some steps, after a checkpoint; at once at the second time.
     """
     progress = progress or Progress(quiet=True)
     directory = scene.output.directory
     _check_packages(scene)
+    with locked(directory):
+        _run(scene, force, resume, progress)
+    return directory
+
+
+def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) -> None:
+    """`run`, while no other process writes the results."""
+    directory = scene.output.directory
     record = _to_resume(scene) if resume else None
     if record is not None and record.status == "complete" and len(record.spans) == len(scene.stages):
-        return directory
+        return
     if record is None:
         check_directory(directory, force or resume)
         dem = scene.grains()
-        record = RunRecord(scene.data, str(scene.path) if scene.path else None, dem.box.size.tolist())
+        record = RunRecord(dict(scene.data), str(scene.path) if scene.path else None, dem.box.size.tolist())
         running = _Run(scene, record, dem, None, progress)
     else:
         dem, coupling = record.load(directory, scene.coupling.conductance)
-        record.scene, record.path = scene.data, str(scene.path) if scene.path else None
+        record.scene, record.path = dict(scene.data), str(scene.path) if scene.path else None
         running = _Run(scene, record, dem, coupling, progress)
     try:
         with _interruptions(running):
             running.go()
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted. {running.stop('interrupted')}") from None
-    except (ComputationError, InputError) as error:
+    except (KeyboardInterrupt, Terminated) as interruption:
+        raise type(interruption)(f"interrupted. {running.stop('interrupted')}") from None
+    except (ComputationError, InputError, OSError) as error:
         kind = ComputationError if isinstance(error, ComputationError) else InputError
-        raise kind(f"{str(error).rstrip('.')}. {running.stop('failed')}") from error
+        reason = f"cannot write {directory}: {error.strerror}" if isinstance(error, OSError) else str(error).rstrip(".")
+        raise kind(f"{reason}. {running.stop('failed')}") from error
     finally:
         running.close()
-    return directory
 
 
 def check(scene: SimulationScene) -> DEM:
@@ -126,7 +140,7 @@ def _to_resume(scene: SimulationScene) -> RunRecord | None:
     """The record of the run to go on with; None to begin, where no checkpoint has been written yet."""
     directory = scene.output.directory
     if not is_simulation(directory):
-        if directory.is_dir() and any(directory.iterdir()):
+        if content_of(directory):
             raise InputError(f"{directory} holds no results of porefv simulate to go on with. Choose another directory")
         return None
     record = read_record(directory)
@@ -149,22 +163,15 @@ def _to_resume(scene: SimulationScene) -> RunRecord | None:
 
 @contextmanager
 def _interruptions(running: _Run) -> Iterator[None]:
-    """The first Ctrl-C asks the run to stop at the end of some steps; the second stops it at once."""
+    """The first Ctrl-C, or SIGTERM, asks the run to stop at the end of some steps; the second stops it at once."""
 
-    def ask(*_: Any) -> None:
+    def ask(number: int, _: Any) -> None:
         if running.asked_to_stop:
-            raise KeyboardInterrupt
-        running.asked_to_stop = True
+            signals.end(number)
+        running.asked_to_stop = number
 
-    try:
-        before = signal.signal(signal.SIGINT, ask)
-    except ValueError:  # not in the main thread: others have to deal with signals
+    with signals.handled(ask, *signals.ENDING):
         yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 class _Times:
@@ -203,7 +210,7 @@ class _Run:
     ):
         self.scene, self.record, self.dem, self.coupling, self.progress = scene, record, dem, coupling, progress
         self.directory = scene.output.directory
-        self.asked_to_stop = False
+        self.asked_to_stop = 0  # the signal that did
         self._clock = time.perf_counter() - record.seconds
         self._saved = dem.steps, time.perf_counter()
         self._axis = AXES.index(scene.output.axis)
@@ -213,17 +220,20 @@ class _Run:
             self._walls.set(stage.walls, span.begin)
         point, output = record.checkpoint, scene.output
         if point is None:
-            clear(self.directory)
-            record.write(self.directory)
+            begin(self.directory, record)
+        tidy(self.directory, point)
         columns = measurements.GRAIN_COLUMNS + (measurements.FLUID_COLUMNS if scene.fluid else ())
-        sizes = point.sizes if point else {}
-        self._series = Series(self.directory / SERIES, columns, sizes.get(SERIES))
+        series = point.series if point else {}
+        self._series = Series(self.directory / SERIES, columns, series.get(SERIES))
         self._profiles: Series | None = None
         if output.profiles is not None:
-            self._profiles = Series(self.directory / PROFILES, measurements.PROFILE_COLUMNS, sizes.get(PROFILES))
+            self._profiles = Series(self.directory / PROFILES, measurements.PROFILE_COLUMNS, series.get(PROFILES))
         self._frames: Frames | None = None
         if output.frames is not None:
             self._frames = Frames(self.directory / FRAMES, dem, output.contacts, point.frames if point else {})
+        if point is None:
+            record.status = RUNNING
+            record.write(self.directory)
         self._profile_times, self._frame_times = (_Times(x, dem.step) for x in (output.profiles, output.frames))
 
     # ---- stages -------------------------------------------------------------------------------------------------
@@ -248,7 +258,7 @@ class _Run:
         """Begin a stage: what it changes."""
         stage, dem = self.scene.stages[k], self.dem
         self.record.spans.append(StageSpan(stage.name, dem.steps, dem.time))
-        self.record.status = "running"
+        self.record.status = RUNNING
         self._walls.set(stage.walls, dem.time)
         if stage.plates:
             dem.set_plates({**dem.plates, **stage.plates})
@@ -302,7 +312,7 @@ class _Run:
             if ended or self.asked_to_stop or self._saving_due:
                 self._save(ended)
             if self.asked_to_stop:
-                raise KeyboardInterrupt
+                signals.end(self.asked_to_stop)
 
     def _most_steps(self, stage: Stage) -> int:
         duration = stage.end.limit if isinstance(stage.end, Rest) else stage.end
@@ -376,11 +386,10 @@ class _Run:
             self.dem, self._axis, self._walls.at(self.dem.time).slip, self.scene.coupling.conductance
         )
         self.record.permeability.append(
-            {
-                "stage": self.scene.stages[k].name, "when": when, "time": self.dem.time,
-                "axis": self.scene.output.axis, "porosity": self.dem.porosity, "permeability": found,
-            }
-        )  # fmt: skip
+            PermeabilityRecord(
+                self.scene.stages[k].name, when, self.dem.time, self.scene.output.axis, self.dem.porosity, found
+            )
+        )
 
     def _show(self, k: int, residual: float) -> None:
         if not self.progress.draws:
@@ -406,18 +415,19 @@ class _Run:
 
     def _save(self, ended: bool) -> None:
         self.record.seconds = time.perf_counter() - self._clock
-        sizes = {SERIES: self._series.size}
+        series = {SERIES: self._series.mark()}
         if self._profiles is not None:
-            sizes[PROFILES] = self._profiles.size
+            series[PROFILES] = self._profiles.mark()
         frames = self._frames.pores if self._frames is not None else {}
-        self.record.save(self.directory, self.dem, self.coupling, ended, sizes, frames)
+        self.record.save(self.directory, self.dem, self.coupling, ended, series, frames)
         self._saved = self.dem.steps, time.perf_counter()
 
     def stop(self, status: str) -> str:
         """Note how the run ended, and tell what there is; what came after the last checkpoint is not noted."""
         record = read_record(self.directory)
         record.status = status
-        record.write(self.directory)
+        with suppress(InputError):  # the disk may be full: the record of the last checkpoint then stays as it is
+            record.write(self.directory)
         if record.checkpoint is None:
             return f"The series so far is in {self.directory}; there is no checkpoint yet to go on from"
         return (

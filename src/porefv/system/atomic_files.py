@@ -1,24 +1,78 @@
 """Files and directories that appear whole or not at all."""
 
 import os
+import re
 import shutil
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 
 from porefv.errors import FORCE_OPTION, InputError
+from porefv.system.locks import hidden_sibling, lock
 
 # A directory that holds this file is a results directory, and may be replaced by a new one.
 RESULTS_MARK = "summary.json"
+
+_TEMPORARY = re.compile(r"\.(?P<stem>.+)-[0-9a-f]{12}(?P<suffix>\.[^.]+)?", re.DOTALL)
+
+
+@contextmanager
+def locked(path: str | PathLike[str]) -> Iterator[None]:
+    """Let no other process write a file or directory while the block runs; see `porefv.system.locks`.
+
+    What a process that was killed has left of it is put right first: a directory that was about to be replaced is put
+    back, and what was not complete is removed.
+
+    Raises
+    ------
+    InputError
+        If another process is writing it, or it cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    if target.parent == target:
+        raise InputError(f"cannot write {path}: it is the root of the file system. Give another place")
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(lock(target))
+            _recover(target)
+        except OSError as error:
+            raise _cannot_write(path, error) from error
+        yield
+
+
+def put_back(path: str | PathLike[str]) -> None:
+    """Put a directory back that a process was about to replace when it was killed; else, do nothing."""
+    target = Path(os.path.realpath(path))
+    if not target.exists() and hidden_sibling(target, "old").exists():
+        # Where this cannot be written, or another process is about to do the same, it stays as it is.
+        with suppress(InputError), locked(target):
+            pass
+
+
+def finished_name(name: str) -> str | None:
+    """What the file of a temporary name was to be called; None if it is not a temporary name of `atomic_write`."""
+    found = _TEMPORARY.fullmatch(name)
+    return None if found is None else found["stem"] + (found["suffix"] or "")
+
+
+def sync_directory(path: Path) -> None:
+    """Have names in a directory outlast a loss of power, where the system can."""
+    with suppress(OSError):
+        directory = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(directory)
+        finally:
+            os.close(directory)
 
 
 @contextmanager
 def atomic_write(path: str | PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; what is written there replaces `path` if the block succeeds.
 
-    If the block fails nothing is left behind, and a file that existed is untouched.
+    If the block fails nothing is left behind, and a file that existed is untouched. Afterwards the file outlasts a
+    loss of power.
 
     Raises
     ------
@@ -35,7 +89,9 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[Path]:
     try:
         _check_file(path, target)
         yield temporary
+        _sync_file(temporary)
         os.replace(temporary, target)
+        sync_directory(target.parent)
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
@@ -57,7 +113,8 @@ def picture_target(path: str | PathLike[str]) -> Path:
 def atomic_directory(path: str | PathLike[str], force: bool = False) -> Iterator[Path]:
     """Yield an empty temporary directory beside `path`, which becomes `path` if the block succeeds.
 
-    If the block fails nothing is left behind, and what existed is untouched.
+    If the block fails nothing is left behind, and what existed is untouched. No other process writes the directory
+    meanwhile. Afterwards the directory outlasts a loss of power.
 
     Parameters
     ----------
@@ -69,27 +126,23 @@ def atomic_directory(path: str | PathLike[str], force: bool = False) -> Iterator
     Raises
     ------
     InputError
-        If the directory is not empty and may not be replaced, or cannot be written. Raised before the block
-        runs, where possible.
+        If the directory is not empty and may not be replaced, is being written by another process, or cannot be
+        written. Raised before the block runs, where possible.
     """
     target = Path(os.path.realpath(path))
-    temporary = _sibling(target)
-    parents: list[Path] = []
-    try:
-        _check_directory(path, target, force)
-        parents += [parent for parent in target.parents if not parent.exists()]
-        temporary.mkdir(parents=True)
-        yield temporary
-        _check_directory(path, target, force)
-        _swap(temporary, target)
-        parents.clear()
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        for parent in parents:
-            with suppress(OSError):
-                parent.rmdir()
+    new = hidden_sibling(target, "new")
+    with locked(path):
+        try:
+            _check_directory(path, target, force)
+            new.mkdir()
+            yield new
+            _check_directory(path, target, force)
+            _sync_tree(new)
+            _swap(new, target)
+        except OSError as error:
+            raise _cannot_write(path, error) from error
+        finally:
+            shutil.rmtree(new, ignore_errors=True)
 
 
 def _check_file(path: str | PathLike[str], target: Path) -> None:
@@ -116,19 +169,53 @@ def _check_directory(path: str | PathLike[str], target: Path, force: bool) -> No
         )
 
 
-def _swap(temporary: Path, target: Path) -> None:
-    """Put a directory in place of another; if that fails, the old one is put back."""
-    old = _sibling(target) if target.exists() else None
+def _swap(new: Path, target: Path) -> None:
+    """Put a directory in place of another; if that fails, the old one is put back, now or by `_recover`."""
+    old = hidden_sibling(target, "old") if target.exists() else None
     if old:
         os.rename(target, old)
     try:
-        os.rename(temporary, target)
+        os.rename(new, target)
     except BaseException:
         if old:
             os.rename(old, target)
         raise
+    sync_directory(target.parent)
     if old:
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _recover(target: Path) -> None:
+    """Put right what a process that was killed has left of a file or directory."""
+    old, new = (hidden_sibling(target, ending) for ending in ("old", "new"))
+    if old.exists():
+        if target.is_dir() and not os.listdir(target):
+            target.rmdir()
+        if not target.exists():
+            os.rename(old, target)
+        elif (target / RESULTS_MARK).exists():
+            shutil.rmtree(old)
+    if new.exists():
+        shutil.rmtree(new)
+    for name in os.listdir(target.parent):
+        if finished_name(name) == target.stem[:100] + target.suffix and (target.parent / name).is_file():
+            (target.parent / name).unlink()
+
+
+def _sync_file(path: Path) -> None:
+    """Have the content of a file outlast a loss of power."""
+    file = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)
+
+
+def _sync_tree(folder: Path) -> None:
+    for directory, _, names in os.walk(folder):
+        for name in names:
+            _sync_file(Path(directory) / name)
+        sync_directory(Path(directory))
 
 
 def _sibling(target: Path) -> Path:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
+from signal import getsignal, raise_signal
 from typing import Any
 
 from porefv.errors import MissingExtraError
+from porefv.system.signals import ENDING, handled
 
 
 def load(module: str, purpose: str) -> Any:
@@ -37,14 +37,8 @@ def ensure_installed(module: str, package: str, purpose: str) -> None:
 @contextmanager
 def _interruptions_held_back() -> Iterator[None]:
     """Ctrl-C waits for the end of the block: interrupted while its libraries load, VTK ends the process by a crash."""
-    if threading.current_thread() is not threading.main_thread() or not callable(signal.getsignal(signal.SIGINT)):
-        yield  # signals come elsewhere, or not at all
-        return
-    came: list[Any] = []
-    before = signal.signal(signal.SIGINT, lambda *signals: came.append(signals))
-    try:
+    came: list[int] = []
+    with handled(lambda number, _: came.append(number), *(number for number in ENDING if callable(getsignal(number)))):
         yield
-    finally:
-        signal.signal(signal.SIGINT, before)
     if came:
-        before(*came[0])  # type: ignore[operator, misc]
+        raise_signal(came[0])

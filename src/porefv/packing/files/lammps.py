@@ -150,6 +150,9 @@ def _check_number(path: AnyPath, declared: int, found: int, last_line: int) -> N
 
 def _packing(path: AnyPath, values: NDArray, lines: NDArray, box: Box | None) -> Packing:
     """Packing from rows id, x, y, z, radius."""
+    odd = np.flatnonzero(~((values[:, 0] >= 0) & (values[:, 0] < 2**53) & (values[:, 0] % 1 == 0)))
+    if len(odd):
+        raise InputError(f"{path}, line {lines[odd[0]]}: atom id {values[odd[0], 0]:g} is not a whole number.")
     order = np.argsort(values[:, 0], kind="stable")
     values, lines = values[order], lines[order]
     twice = np.flatnonzero(values[1:, 0] == values[:-1, 0])

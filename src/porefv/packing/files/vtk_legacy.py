@@ -87,6 +87,8 @@ class _Arrays(Mapping[str, NDArray[np.float64]]):
 
 def _numbers(path: AnyPath, content: bytes, name: str, keywords: re.Match[bytes], size: int) -> NDArray[np.float64]:
     """The numbers that follow the keywords of an array."""
+    if size > len(content):  # of which each takes a byte at least
+        raise InputError(f"{path}: {name} is said to have {size:.3g} numbers, more than the file has bytes.")
     binary = content.split(b"\n", 3)[2].strip().upper() == b"BINARY"
     dtype = np.dtype(_TYPES[keywords["type"].decode()])
     if binary:

@@ -1,0 +1,174 @@
+"""Locks on results: one process at a time writes a file or a directory.
+
+The lock of `results` is a hidden file beside it, `.results.porefv-lock`, that says which process holds it. The system
+locks that file for as long as the process lives, so that nothing has to be cleaned up after a kill: whoever comes next
+takes the lock over. Where a file system knows no locks, or only those of its own host, the file's age decides: who
+holds a lock touches its file every few seconds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import socket
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from porefv.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # not POSIX
+    fcntl = None  # type: ignore[assignment]
+
+# Seconds between two touches of the file of a lock, and after how many without one its holder is taken to be gone.
+TOUCHED, GONE = 15.0, 90.0
+# Most bytes read of the file of a lock.
+_MOST = 4096
+
+
+@contextmanager
+def lock(target: Path) -> Iterator[None]:
+    """Hold the lock of a file or directory while the block runs.
+
+    Parameters
+    ----------
+    target : Path
+        Absolute, without links. It need not exist; missing parents are made, and removed again if they stay empty.
+
+    Raises
+    ------
+    InputError
+        If another process, or another thread, holds it.
+    OSError
+        If the file of the lock cannot be written.
+    """
+    path = hidden_sibling(target, "lock")
+    made = [parent for parent in target.parents if not parent.exists()]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        file = _taken(path, target)
+        ended = threading.Event()
+        touching = threading.Thread(target=_touch, args=(path, ended), name="porefv-lock", daemon=True)
+        touching.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            touching.join()
+            # Removed while it is held: who waits for this very file sees that it is not there any more.
+            with suppress(OSError):
+                path.unlink()
+            _release(file)
+    finally:
+        for parent in made:
+            with suppress(OSError):
+                parent.rmdir()
+
+
+def hidden_sibling(target: Path, ending: str) -> Path:
+    """A hidden name beside a file or directory: `.results.porefv-lock`, say."""
+    name = target.name
+    if len(os.fsencode(name)) > 200:  # of the 255 bytes that a name may have
+        name = f"{name[:40]}-{hashlib.sha256(os.fsencode(name)).hexdigest()[:16]}"
+    return target.parent / f".{name}.porefv-{ending}"
+
+
+def _taken(path: Path, target: Path) -> int:
+    """Take the lock; its file, open."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    while True:
+        file = os.open(path, flags, 0o644)
+        try:
+            locked, holder = _system_lock(file), _holder(file)
+            if locked is False:
+                raise _held(target, holder)
+            if not _is_still(file, path):  # its holder has removed it meanwhile
+                os.close(file)
+                continue
+            # Had a holder lived that the system's lock held for, the lock would not be ours.
+            gone = locked and holder.get("locked") is True and holder.get("host") == socket.gethostname()
+            if holder and not gone and _age(file, path.parent) < GONE:
+                raise _held(target, holder)
+            _describe(file, locked is True)
+            return file
+        except BaseException:
+            _release(file)
+            raise
+
+
+def _system_lock(file: int) -> bool | None:
+    """Lock a file: whether that succeeded, or another has locked it; None where there are no locks of the system."""
+    if fcntl is None:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+
+
+def _release(file: int) -> None:
+    """Unlock a file, also where processes made by fork share it, and close it."""
+    if fcntl is not None:
+        with suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_UN)
+    with suppress(OSError):
+        os.close(file)
+
+
+def _is_still(file: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
+    except OSError:
+        return False
+
+
+def _age(file: int, folder: Path) -> float:
+    """Seconds since a file was touched, by the clock of its file system, which may be another host's."""
+    with tempfile.TemporaryFile(dir=folder) as now:
+        return os.fstat(now.fileno()).st_mtime - os.fstat(file).st_mtime
+
+
+def _describe(file: int, locked: bool) -> None:
+    """Write who holds the lock."""
+    holder = {
+        "host": socket.gethostname(),
+        "process": os.getpid(),
+        "since": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "locked": locked,
+    }
+    os.ftruncate(file, 0)
+    os.lseek(file, 0, os.SEEK_SET)
+    os.write(file, json.dumps(holder).encode())
+
+
+def _holder(file: int) -> dict[str, Any]:
+    """Who holds the lock, as far as its file says."""
+    try:
+        os.lseek(file, 0, os.SEEK_SET)
+        found = json.loads(os.read(file, _MOST))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _held(target: Path, holder: dict[str, Any]) -> InputError:
+    who = "another process"
+    if holder:
+        who = f"process {holder.get('process')} on {holder.get('host')}, since {holder.get('since')}"
+    return InputError(f"{target} is being written by {who}. Wait for its end, or choose another place for the results")
+
+
+def _touch(path: Path, ended: threading.Event) -> None:
+    while not ended.wait(TOUCHED):
+        with suppress(OSError):
+            os.utime(path)
