@@ -1,6 +1,9 @@
 import io
+import json
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -253,3 +256,100 @@ def test_solve_draws_its_progress_on_a_terminal(scene):
     os.close(leader)
     for number, stage in enumerate(FlowScene.read(scene).stages, 1):
         assert f"{number}/7 {stage}" in text
+
+
+# Whoever stops it, or cannot listen
+
+
+def test_sigterm_is_status_143_and_nothing_is_left(scene, capsys, monkeypatch):
+    monkeypatch.setattr(FlowScene, "pore_flow", lambda *arguments: signal.raise_signal(signal.SIGTERM))
+    assert main(["solve", str(scene)]) == 143
+    assert capsys.readouterr().err == "porefv: error: terminated; nothing was written\n"
+    assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_a_signal_that_comes_within_a_kernel_is_a_signal(scene, monkeypatch):
+    def interrupted(*arguments):
+        raise SystemError("a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(FlowScene, "pore_flow", interrupted)
+    assert main(["solve", str(scene)]) == 130
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full")
+@pytest.mark.parametrize(
+    ("output", "reason"), [(">/dev/full", "No space left on device"), (">&-", "it is closed"), (">&- 2>&-", "")]
+)
+def test_an_output_that_cannot_be_written_to(scene, output, reason):
+    said = run_in_shell(f"{sys.executable} -m porefv solve {scene} {output}", 1)
+    assert said == (f"porefv: error: cannot write to standard output: {reason}. Files that were to be written are "
+                    "complete\n" if reason else "")  # fmt: skip
+    assert json.loads((scene.parent / "results" / "summary.json").read_text())["permeability"] > 0.0
+    assert run_in_shell(f"{sys.executable} -m porefv info {scene.parent / 'results'} {output}", 1) == said
+    assert run_in_shell(f"{sys.executable} -m porefv solve {scene} --force --quiet {output}", 0) == ""
+
+
+def run_in_shell(command, status):
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
+    assert done.returncode == status and done.stdout == ""
+    return done.stderr
+
+
+def test_an_output_of_few_characters_gets_what_it_knows(scene):
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    assert r"permeability 0.000190292 m\xb2" in run("solve", scene, env=environment).stdout
+
+
+# Names and texts of all kinds
+
+
+def test_control_characters_are_shown_not_sent_to_the_terminal(tmp_path, capsys):
+    name = "\x1b[31mred\x07\u202e.csv"
+    shutil.copyfile(DATA / "packings" / "n25_s1.csv", tmp_path / name)
+    scene = tmp_path / "\x1b[2J.toml"
+    scene.write_text(
+        f"packing = {json.dumps(name)}\n[walls]\nx_min = {{ pressure = 1.0 }}\nx_max = {{ pressure = 0.0 }}"
+    )
+    for arguments in (["check"], ["solve"], ["solve"]):
+        main([*arguments, str(scene)])
+    main(["info", str(tmp_path / "results")])
+    main(["info", str(tmp_path / "no\x1b[1m")])
+    with pytest.raises(SystemExit):
+        main(["solve", "\x1b[1m", "\x1b[2m"])
+    said = "".join(capsys.readouterr())
+    assert r"\x1b[31mred\x07\u202e.csv" in said and r"\x1b[2J.toml" in said and r"no\x1b[1m" in said
+    assert all(character.isprintable() or character == "\n" for character in said)
+
+
+@pytest.mark.parametrize("long", ["[fluid]\n{} = 1", '[output]\nquantities = ["{}"]', '[output]\ndirectory = "{}"',
+                                  '[{}]', "a = {}"])  # fmt: skip
+def test_messages_are_bounded(scene, capsys, long):
+    scene.write_text(scene.read_text().partition("[output]")[0] + long.format("k" * 1_000_000))
+    assert main(["solve", str(scene)]) == 2
+    said = capsys.readouterr().err
+    assert 20 < len(said) < 2100 and "defect" not in said
+
+
+@pytest.mark.parametrize("digits", [4000, 5000])
+def test_numbers_of_thousands_of_digits_are_refused(scene, capsys, digits):
+    scene.write_text(f"{scene.read_text()}[fluid]\nviscosity = {'9' * digits}\n")
+    assert main(["solve", str(scene)]) == 2
+    assert "scene.toml" in (said := capsys.readouterr().err) and len(said) < 400 and "defect" not in said
+
+
+@pytest.mark.parametrize("command", ["solve", "check", "trade"])
+def test_the_root_is_no_place_for_results(scene, capsys, command):
+    scene.write_text(f'{scene.read_text()}directory = "/"\n')
+    assert main([command, str(scene), *["--out", "/"] * (command == "trade")]) == 2
+    assert "cannot write /: it is the root of the file system" in capsys.readouterr().err
+
+
+def test_a_tilde_is_the_home_directory(scene, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(scene.parent / "home"))
+    scene.write_text(f'{scene.read_text()}directory = "~/results"\n')
+    assert main(["solve", str(scene), "--quiet"]) == 0
+    assert (scene.parent / "home" / "results" / "summary.json").is_file()
+    scene.write_text(scene.read_text().replace("~/", "~nobody_of_this_name/"))
+    assert main(["solve", str(scene)]) == 2
+    assert "the home directory in '~nobody_of_this_name/results' is not known" in capsys.readouterr().err

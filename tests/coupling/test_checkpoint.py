@@ -269,6 +269,11 @@ def test_a_checkpoint_of_grains_alone_is_not_one_of_a_coupling(coupled, tmp_path
         (lambda header, content: header["settings"].update(colour="red"), "colour"),
         (lambda header, content: header["conductance"]["parameters"].update(friction=-1.0), "friction must be"),
         (lambda header, content: header["effort"].pop("steps") and header["effort"].update(colour=1), "colour"),
+        (lambda header, content: header["numbers"].update(scheme="magic"), "there is no scheme 'magic'"),
+        (lambda header, content: content["pressure"].put(0, np.nan), "pressure is not finite"),
+        (lambda header, content: content["mesh_centres"].put(0, np.inf), "mesh_centres is not finite"),
+        (lambda header, content: content["mesh_radii"].put(0, -1.0), "radi"),
+        (lambda header, content: content["dem_pairs_others"].put(0, 2**30), "pairs_others are not those of pairs"),
         (lambda header, content: content.pop("dem_pairs_shear"), r"porefv\.dem.*'pairs_shear' is missing"),
     ],
 )

@@ -261,6 +261,22 @@ def test_a_newer_format_says_so(rewritten, saved):
         (lambda header, content: header["material"].update(colour="red"), "colour"),
         (lambda header, content: header["material"].update(young=-1.0), "young"),
         (lambda header, content: header["plates"].pop("z_max"), "'z_max' is missing"),
+        (lambda header, content: header["numbers"].update(step=float("inf")), "step is out of range"),
+        (lambda header, content: header["numbers"].update(time=float("nan")), "time is not finite"),
+        (lambda header, content: header["numbers"].update(listing_slack=1e9), "listing_slack is not within a radius"),
+        (lambda header, content: content["order"].put(0, -1), "order is no numbering"),
+        (lambda header, content: content["order"].put(0, 1), "order is no numbering"),
+        (lambda header, content: content["rank"].put(0, 10**12), "rank is not the inverse of order"),
+        (lambda header, content: content["pairs_grains"].put(1, 2**30), "are not pairs of two grains"),
+        (lambda header, content: content["pairs_grains"].put(0, -1), "are not pairs of two grains"),
+        (lambda header, content: content["pairs_grains"].put([0, 1], [5, 6]), "pairs_grains are not sorted"),
+        (lambda header, content: content["pairs_starts"].put(1, 10**12), "pairs_starts are not those of pairs"),
+        (lambda header, content: content["pairs_others"].put(0, 2**30), "pairs_others are not those of pairs"),
+        (lambda header, content: content["wall_pairs_members"].put(0, -7), "not pairs of a grain and a wall"),
+        (lambda header, content: content["wall_pairs_members"].put(1, 6), "not pairs of a grain and a wall"),
+        (lambda header, content: content["grains_motion"].put(0, np.nan), "grains_motion is not finite"),
+        (lambda header, content: content["grains_motion"].put(3, -1.0), "radius that is not positive"),
+        (lambda header, content: content["walls_places"].put(0, 1e9), "walls_places make no box"),
     ],
 )
 def test_content_that_does_not_fit_together_is_refused(rewritten, saved, change, reason):
@@ -268,6 +284,29 @@ def test_content_that_does_not_fit_together_is_refused(rewritten, saved, change,
     rewritten(path, change)
     with pytest.raises(InputError, match=rf"state\.npz is not a checkpoint .*{reason}"):
         checkpoint.load(path)
+
+
+def test_a_file_that_would_unpack_to_any_size_is_refused(saved):
+    _, path = saved
+    with np.load(path) as file:
+        content = dict(file)
+    np.savez_compressed(path, **content)
+    with pytest.raises(InputError, match="its arrays are packed"):
+        checkpoint.load(path)
+
+
+@pytest.mark.parametrize("name", ["order", "rank", "pairs_grains", "pairs_starts", "pairs_others", "pairs_ranges",
+                                  "wall_pairs_members", "wall_pairs_ranges"])  # fmt: skip
+def test_no_index_leads_out_of_an_array(rewritten, tmp_path, name):
+    rng = np.random.default_rng(0)
+    for value in (-1, 2**31 - 1, -(2**31), 7):
+        dem = assembly("sc8")
+        checkpoint.save(dem, tmp_path / "state.npz")
+        rewritten(tmp_path / "state.npz", lambda _, content: content[name].put(rng.integers(content[name].size), value))  # noqa: B023
+        try:
+            checkpoint.load(tmp_path / "state.npz").run(20)
+        except InputError as error:
+            assert name in str(error)
 
 
 # ---- saving on the way ----------

@@ -52,7 +52,7 @@ def run(arguments, at=None, failure=None, folder=None):
                 inject(at, failure, os.fspath(folder))
             with redirect_stderr(said), redirect_stdout(io.StringIO()):
                 status = main(arguments)
-        except BaseException:  # noqa: BLE001 - whatever it was, the parent shall see it
+        except BaseException:
             said.write(traceback.format_exc())
         finally:
             os.write(writer, said.getvalue()[-5000:].encode())

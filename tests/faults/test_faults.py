@@ -9,12 +9,20 @@ import errno
 import json
 import os
 import shutil
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from porefv.cli.program import main
+from porefv.comparison import comparison, output
+from porefv.comparison.comparison import MethodComparison
+from porefv.comparison.measurement import MethodResult
+from porefv.comparison.methods import Method
 from porefv.packing.packing import Packing
+from porefv.resolved.reference import StokesReference
 from porefv.simulation.run_record import read_record
+from porefv.system.atomic_files import put_back
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="copies of the process by fork")
 
@@ -171,6 +179,51 @@ def test_pack(survives, made, force):
     survives(arguments, prepare, check, errno.ENOSPC)
 
 
+@pytest.fixture(scope="module")
+def resolved(data_packing):
+    return StokesReference.read(next((Path(data_packing).parents[1] / "reference" / "stokes").glob("nine*")))
+
+
+def test_reference(survives, old, resolved, monkeypatch):
+    monkeypatch.setattr("porefv.resolved.refinement.require_ngsolve", lambda: None)
+    monkeypatch.setattr("porefv.resolved.refinement.stokes_reference", lambda *arguments, **options: resolved)
+    arguments = ["reference", "scene.toml", "--quiet", "--out", "flow.json", "--force"]
+
+    def prepare(folder):
+        put(old, folder, "scene.toml")
+        (folder / "flow.json").write_text("earlier")
+
+    def check(folder):
+        found = (folder / "flow.json").read_text()
+        assert found == "earlier" or StokesReference.read("flow.json").permeability == resolved.permeability
+        assert main(arguments) == 0
+        assert sorted(os.listdir(folder)) == ["flow.json", "scene.toml"]
+
+    survives(arguments, prepare, check)
+    survives(arguments, prepare, check, errno.ENOSPC)
+
+
+def test_trade(survives, old, monkeypatch):
+    forces = np.ones((3, 3))
+    results = [MethodResult(Method(name, name), 1.0, forces * x, x, x) for name, x in (("one", 1.0), ("two", 2.0))]
+    monkeypatch.setattr(output, "draw", lambda found, path: path.write_bytes(b"picture"))
+    monkeypatch.setattr(comparison, "compare", lambda *arguments, **options: MethodComparison(results, results[0]))
+    arguments = ["trade", "scene.toml", "--quiet", "--out", "trade", "--force"]
+
+    def prepare(folder):
+        put(old, folder, "scene.toml")
+        (folder / "trade").mkdir()
+        (folder / "trade" / "summary.json").write_text("{}")
+
+    def check(folder):
+        put_back("trade")
+        assert sorted(os.listdir("trade")) in (["summary.json"], ["summary.json", "trade.csv", "trade.png"])
+        assert main(arguments) == 0
+        assert sorted(os.listdir(folder)) == ["scene.toml", "trade"] and len(os.listdir("trade")) == 3
+
+    survives(arguments, prepare, check)
+
+
 # ---- a simulation -----------------------------------------------------------------------------------------------
 
 
@@ -231,3 +284,24 @@ def test_simulate_resume(survives, killed, whole_run, tmp_path):
 
     arguments = ["simulate", "scene.toml", "--quiet", "--resume"]
     survives(arguments, lambda folder: put(stopped, folder, "scene.toml", "results"), check)
+
+
+class Picture:
+    def savefig(self, path, dpi):
+        path.write_bytes(b"picture")
+
+
+def test_plot(survives, whole_run, monkeypatch):
+    monkeypatch.setattr("porefv.simulation.series_picture.series_picture", lambda directory: Picture())
+    arguments = ["plot", "results", "--out", "picture.png"]
+
+    def prepare(folder):
+        put(whole_run, folder, "results")
+        (folder / "picture.png").write_bytes(b"earlier")
+
+    def check(folder):
+        assert (folder / "picture.png").read_bytes() in (b"earlier", b"picture")
+        assert main(arguments) == 0
+        assert sorted(os.listdir(folder)) == ["picture.png", "results"]
+
+    survives(arguments, prepare, check)

@@ -278,6 +278,67 @@ def test_an_interrupt_waits_for_a_checkpoint(path, monkeypatch, capsys):
     assert after == files(run(path, DRY, "--force"))
 
 
+def test_sigterm_waits_for_a_checkpoint_too(path, capsys, monkeypatch):
+    path.write_text(DRY)
+    original, sent = DEM.run, []
+
+    def terminated(dem, steps):
+        original(dem, steps)
+        if dem.steps > 150 and not sent:
+            sent.append(dem.steps)
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(DEM, "run", terminated)
+    assert main(["simulate", str(path)]) == 143
+    assert "go on from there with" in capsys.readouterr().err
+    record = read_record(path.parent / "results")
+    assert record.status == "interrupted" and record.checkpoint.step >= sent[0]
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert main(["simulate", str(path), "--resume", "--quiet"]) == 0
+
+
+@pytest.mark.parametrize("options", [["--resume"], ["--force"]])
+def test_of_two_runs_at_once_one_is_refused_and_the_other_is_right(path, tmp_path, options):
+    whole = files(run(path, WET + "[checkpoint]\nsteps = 50\n").rename(tmp_path / "whole"))
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-m", "porefv", "simulate", str(path), "--quiet", *options],
+            env=environment, stderr=subprocess.PIPE, text=True,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    said = [process.communicate()[1] for process in processes]
+    statuses = [process.returncode for process in processes]
+    assert sorted(statuses) in ([0, 0], [0, 2])  # the second may have come when the first was done
+    if 2 in statuses:
+        assert "results is being written by process" in said[statuses.index(2)]
+    assert files(tmp_path / "results") == whole
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda content: content.replace(b"1", b"2", 1), "is not as it was written"),
+        (lambda content: content[:-1] + b"\0", "is not as it was written"),
+        (lambda content: content[:-100], "shorter than at its checkpoint"),
+        (lambda content: content + content[-50:], "has grown since the run was complete"),
+    ],
+)
+def test_damage_of_the_series_is_found(path, capsys, damage, said):
+    found = run(path, DRY.replace("0.02", "0.002"))
+    (found / "series.csv").write_bytes(damage((found / "series.csv").read_bytes()))
+    for arguments in (["info", str(found)], ["plot", str(found), "--out", str(path.parent / "picture.png")]):
+        assert main(arguments) == 2
+        assert said in capsys.readouterr().err
+    with pytest.raises(InputError, match=said):
+        read_series(found)
+    if "grown" not in said:  # rows after a checkpoint are dropped by whoever goes on from it
+        path.write_text(path.read_text() + "[[stages]]\nduration = 0.001\n")
+        assert main(["simulate", str(path), "--resume"]) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_stages_may_be_added_and_nothing_else_changed(path, capsys):
     found = run(path, DRY)
     before = (found / "series.csv").read_bytes()

@@ -28,8 +28,11 @@ def run(options: argparse.Namespace) -> None:
 
     if is_simulation(options.results):
         from porefv.cli.simulate import outcome_text
+        from porefv.simulation.reading import check_series
 
-        say(outcome_text(read_record(options.results), options.results))
+        record = read_record(options.results)
+        check_series(record, options.results)
+        say(outcome_text(record, options.results))
     else:
         say(summary_text(read(options.results)))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
-from porefv.cli.text import say
+from porefv.cli.text import path_text, say
 from porefv.errors import InputError, counted
 
 if TYPE_CHECKING:
@@ -55,7 +55,10 @@ def outcome_text(record: RunRecord, directory: Path) -> str:
         lines.append(
             f"permeability {found.permeability:.4g} m², porosity {found.porosity:.4f} {found.when} {found.stage}"
         )
-    return "\n".join([*lines, f"results in {directory}"])
+    if record.status != "complete":
+        states = {"running": "running, or killed", "starting": "has only begun"}
+        lines.append(f"not complete: {states.get(record.status, record.status)}")
+    return "\n".join([*lines, f"results in {path_text(directory)}"])
 
 
 def scene_text(scene: SimulationScene, grains: DEM) -> str:

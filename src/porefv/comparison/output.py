@@ -55,12 +55,10 @@ def save(found: MethodComparison, folder: Path) -> None:
 
 def draw(found: MethodComparison, path: Path) -> None:
     """Draw the error of the forces against time and against memory, the Pareto front joined."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), sharey=True, layout="constrained")
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
     others = [result for result in found.results if result is not found.reference]
     for axis, measure, label in (
         (axes[0], lambda result: result.seconds, "time, s"),

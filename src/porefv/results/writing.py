@@ -26,7 +26,7 @@ from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
 from porefv.results.summary import summary_json
-from porefv.system.atomic_files import atomic_directory
+from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
 
@@ -93,6 +93,7 @@ def check_target(directory: str | PathLike[str], *, vtk: bool, table_format: str
     check_table_format(table_format, "forces")
     if vtk:
         vtk_data_model()
+    check_is_no_root(directory)
     directory = Path(directory)
     try:
         content = sorted(os.listdir(directory)) if directory.is_dir() else []

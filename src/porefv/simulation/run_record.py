@@ -19,7 +19,7 @@ from porefv.dem import checkpoint as dry_checkpoint
 from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
 from porefv.simulation.series import FILES, PROFILES, SERIES, SeriesMark
-from porefv.system.atomic_files import atomic_write, finished_name, sync_directory
+from porefv.system.atomic_files import atomic_write, check_is_no_root, finished_name, sync_directory
 from porefv.system.version import __version__
 
 RECORD, FORMAT, VERSION = "simulation.json", "porefv.simulation", 2
@@ -246,6 +246,7 @@ def check_directory(directory: Path, force: bool) -> None:
     InputError
         Before anything is computed.
     """
+    check_is_no_root(directory)
     content = content_of(directory)
     try:
         existing = next(path for path in (directory, *directory.absolute().parents) if path.exists())

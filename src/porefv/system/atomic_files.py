@@ -31,8 +31,7 @@ def locked(path: str | PathLike[str]) -> Iterator[None]:
         If another process is writing it, or it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    if target.parent == target:
-        raise InputError(f"cannot write {path}: it is the root of the file system. Give another place")
+    check_is_no_root(path)
     with ExitStack() as stack:
         try:
             stack.enter_context(lock(target))
@@ -40,6 +39,13 @@ def locked(path: str | PathLike[str]) -> Iterator[None]:
         except OSError as error:
             raise _cannot_write(path, error) from error
         yield
+
+
+def check_is_no_root(path: str | PathLike[str]) -> None:
+    """InputError if a path is the root of the file system, which nothing can be written in place of."""
+    target = Path(os.path.realpath(path))
+    if target.parent == target:
+        raise InputError(f"cannot write {path}: it is the root of the file system. Give another place")
 
 
 def put_back(path: str | PathLike[str]) -> None:

@@ -14,6 +14,7 @@ import os
 import socket
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -86,13 +87,14 @@ def _taken(path: Path, target: Path) -> int:
     while True:
         file = os.open(path, flags, 0o644)
         try:
-            locked, holder = _system_lock(file), _holder(file)
+            locked = _system_lock(file)
             if locked is False:
-                raise _held(target, holder)
+                raise _held(target, _holder_in_a_moment(file))
             if not _is_still(file, path):  # its holder has removed it meanwhile
                 os.close(file)
                 continue
             # Had a holder lived that the system's lock held for, the lock would not be ours.
+            holder = _holder(file)
             gone = locked and holder.get("locked") is True and holder.get("host") == socket.gethostname()
             if holder and not gone and _age(file, path.parent) < GONE:
                 raise _held(target, holder)
@@ -159,6 +161,15 @@ def _holder(file: int) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def _holder_in_a_moment(file: int) -> dict[str, Any]:
+    """Who holds the lock, who may be about to write it."""
+    for _ in range(20):
+        if holder := _holder(file):
+            return holder
+        time.sleep(0.02)
+    return {}
 
 
 def _held(target: Path, holder: dict[str, Any]) -> InputError:
