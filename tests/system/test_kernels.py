@@ -81,6 +81,16 @@ def test_a_directory_that_others_may_write_to_is_left_out(tmp_path):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the administrator gives files away")
+def test_a_directory_of_another_user_is_left_out(tmp_path):
+    folder = tmp_path / kernel_files.KEPT
+    folder.mkdir()
+    os.chown(folder, 12345, 12345)
+    done = run(NUMBA_CACHE_DIR=str(tmp_path))
+    assert (done.returncode, done.stdout) == (0, FOUND)
+    assert "can be written to by other users" in done.stderr and list(folder.iterdir()) == []
+
+
 @pytest.mark.parametrize("damage", [b"", b"x", "half", "bit"])
 def test_a_damaged_file_is_compiled_anew_and_replaced(tmp_path, damage):
     run(NUMBA_CACHE_DIR=str(tmp_path))

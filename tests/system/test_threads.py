@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -193,6 +194,15 @@ def test_a_process_made_from_one_that_has_computed_computes(method, tmp_path):
     script.write_text(POOL)
     command = [sys.executable, str(script), method, str(PACKINGS / "n5000_s1.csv")]
     assert subprocess.run(command, capture_output=True, text=True, timeout=120).stdout == "True\n"
+
+
+def test_eight_threads_ask_one_flow_at_once(four, reference):
+    expected = PoreFlow(reference("n2000_s1"), Walls.along("y"))
+    flow = PoreFlow(reference("n2000_s1"), Walls.along("y"))
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda name: getattr(flow, name), ["permeability", "pressure", "forces", "inflow"] * 2))
+    assert found[0] == found[4] == expected.permeability
+    assert np.array_equal(found[1], expected.pressure) and np.array_equal(found[6].total, expected.forces.total)
 
 
 def test_ctrl_c_ends_a_computation_between_blocks(four):

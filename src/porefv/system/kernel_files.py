@@ -167,16 +167,24 @@ def kept_folder() -> Path | None:
             tempfile.TemporaryFile(dir=folder).close()
         except OSError:
             continue
-        if os.name == "posix" and folder.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        if _others_may_write(folder):
             warnings.warn(
                 f"{folder} can be written to by other users, who could put any code there: no kernels are kept in it. "
-                f"Take that right away (chmod go-w {folder})",
+                f"Take that right away (chmod go-w {folder}), or name a directory of your own in NUMBA_CACHE_DIR",
                 CompilationWarning,
                 stacklevel=1,
             )
             continue
         return folder
     return None
+
+
+def _others_may_write(folder: Path) -> bool:
+    """Whether users besides this one, and the administrator, may write to a directory."""
+    if os.name != "posix":
+        return False
+    found = folder.stat()
+    return bool(found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)) or found.st_uid not in (os.geteuid(), 0)
 
 
 def _folders() -> Iterator[Path]:
@@ -195,7 +203,7 @@ def _warn(reason: str) -> None:
     """Once in a process: numba makes Python forget which warnings it has shown."""
     warnings.warn(
         f"compiled kernels cannot be kept ({reason}): every process compiles anew, for a minute. "
-        "Name a directory with room in the variable NUMBA_CACHE_DIR",
+        "Name a directory of your own with room, that nobody else can write to, in the variable NUMBA_CACHE_DIR",
         CompilationWarning,
         stacklevel=1,
     )
