@@ -105,6 +105,17 @@ def test_a_damaged_file_is_refused_and_vtk_prints_nothing(tmp_path, points, exte
     assert capfd.readouterr() == ("", "") and not caplog.records
 
 
+@pytest.mark.parametrize("encoding", ["ASCII", "BINARY"])
+def test_a_field_that_is_said_to_be_larger_than_the_file_is_refused(tmp_path, encoding):
+    huge = 10**15 - 1
+    (tmp_path / "a.vtk").write_text(
+        f"# vtk DataFile Version 3.0\ntitle\n{encoding}\nDATASET POLYDATA\nPOINTS 1 float\n0 0 0 \n"
+        f"POINT_DATA 1\nFIELD FieldData 1\nradius {huge} {huge} float\n1\n"
+    )
+    with pytest.raises(InputError, match=r"a\.vtk: radius is said to have 1e\+30 numbers, more than the file"):
+        Packing.read(tmp_path / "a.vtk")
+
+
 def test_another_data_set_is_refused(tmp_path):
     pyvista.MultiBlock([pyvista.Sphere()]).save(tmp_path / "a.vtm")
     with pytest.raises(InputError, match="a.vtm"):
