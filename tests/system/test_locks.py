@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import nullcontext
 
 import pytest
 
@@ -152,10 +153,22 @@ def test_without_locks_of_the_system_the_file_decides(tmp_path, monkeypatch):
     with locked(tmp_path / "results"):
         for _ in range(5):
             time.sleep(0.2)
+            locks.touch()
             with pytest.raises(InputError, match="being written"), locked(tmp_path / "results"):
                 pass
     with locked(tmp_path / "results"):
         pass
+
+
+def test_without_locks_of_the_system_a_process_that_is_gone_is_known_on_its_host(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "fcntl", None)
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    for host, refused in ((socket.gethostname(), False), ("node17", True)):
+        holder = {"host": host, "process": process.pid, "since": "yesterday", "locked": False}
+        (tmp_path / ".results.porefv-lock").write_text(json.dumps(holder))
+        with pytest.raises(InputError, match="on node17") if refused else nullcontext(), locked(tmp_path / "results"):
+            pass
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[1]", b"\xff" * 10_000, b"{}"])

@@ -37,7 +37,7 @@ from porefv.simulation.run_record import (
     tidy,
 )
 from porefv.simulation.series import PROFILES, SERIES, Series, copy_tables
-from porefv.system import signals
+from porefv.system import locks, signals
 from porefv.system.atomic_files import locked
 from porefv.system.progress import Progress
 from porefv.system.signals import Terminated
@@ -305,6 +305,7 @@ class _Run:
             ended = self._ended(stage, last, look=strides.due(target, ended=False))
             self._record(k, residual, row=rows.due(target, ended), ended=ended)
             self._show(k, residual)
+            locks.touch()
             if ended:
                 span.end = dem.time
                 if stage.permeameter:
