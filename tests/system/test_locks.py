@@ -3,18 +3,22 @@
 import json
 import multiprocessing
 import os
+import shutil
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
 from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
 from porefv.errors import InputError
 from porefv.system import locks
 from porefv.system.atomic_files import atomic_directory, locked, put_back
+from porefv.system.signals import ENDING, Terminated, end, handled
 
 HOLD = """
 import sys, time
@@ -235,3 +239,56 @@ def test_what_was_replaced_and_what_was_not_complete_is_removed(tmp_path):
         pass
     assert sorted(path.name for path in tmp_path.iterdir()) == [".results-0123456789ab.csv", "results"]
     assert (tmp_path / "results" / "summary.json").read_text() == "new"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_between_or_after_the_two_renamings(tmp_path, monkeypatch, number):
+    rename = os.rename
+
+    def interrupted(source, target):
+        rename(source, target)
+        if Path(source).name == at and not sent:
+            sent.append(at)
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(os, "rename", interrupted)
+    for at, left in (("results", "old"), (".results.porefv-new", "new")):  # noqa: B007
+        results(tmp_path / "results")
+        sent = []
+        with (
+            pytest.raises((KeyboardInterrupt, Terminated)),
+            handled(lambda number, _: end(number), *ENDING),
+            atomic_directory(tmp_path / "results", force=True) as folder,
+        ):
+            (folder / "summary.json").write_text("new")
+        with locked(tmp_path / "results"):
+            assert (tmp_path / "results" / "summary.json").read_text() == left
+        assert [path.name for path in tmp_path.iterdir()] == ["results"]
+        shutil.rmtree(tmp_path / "results")
+
+
+def test_what_stands_in_the_way_is_removed_whatever_it_is(tmp_path):
+    new = tmp_path / ".results.porefv-new"
+    (tmp_path / "precious").mkdir()
+    for make in (new.touch, lambda: new.symlink_to("precious"), lambda: new.symlink_to("nowhere")):
+        make()
+        with atomic_directory(tmp_path / "results", force=True) as folder:
+            (folder / "summary.json").write_text("{")
+    results(tmp_path / ".results.porefv-old")
+    (tmp_path / ".results.porefv-old" / "more").mkdir()
+    (tmp_path / ".results.porefv-old" / "more").chmod(0o555)
+    with locked(tmp_path / "results"):
+        pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["precious", "results"]
+
+
+def test_results_of_another_program_are_not_replaced(tmp_path):
+    results(tmp_path / "results", '{"mine": 1}')
+    with pytest.raises(InputError, match="not results of porefv"), atomic_directory(tmp_path / "results", force=True):
+        pass
+
+
+def test_a_link_to_itself_is_no_place_for_results(tmp_path):
+    (tmp_path / "results").symlink_to("results")
+    with pytest.raises(InputError, match="a link to itself"), atomic_directory(tmp_path / "results"):
+        pass
