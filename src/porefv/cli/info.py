@@ -63,7 +63,6 @@ def _summary_text(results: Results) -> str:
             ("hidden spheres", packing["hidden_spheres"] or None),
             ("overlapping pairs", count_text(packing['overlapping_pairs'])),
             ("porosity", f"{packing['porosity']:.6g}"),
-            ("porosity error", _bound(packing["porosity_error"], "too high, where three spheres meet")),
             ("pore volume", f"{packing['pore_volume']:.6g} m³"),
         ]),
         ("Pores", [

@@ -87,7 +87,6 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "radii": [packing.radii.min(), packing.radii.max()],
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
-        "porosity_error": packing.porosity_error,
         "pore_volume": packing.porosity * mesh.box.volume,
     }
 
