@@ -107,7 +107,11 @@ def _taken(path: Path, target: Path) -> int:
             holder = _holder(file)
             if holder and not _is_gone(holder, locked is True) and _age(file, path.parent) < GONE:
                 raise _held(target, holder)
-            _describe(file, locked is True)
+            try:
+                _describe(file, locked is True)
+            except BaseException:  # the disk is full, say
+                path.unlink(missing_ok=True)
+                raise
             return file
         except BaseException:
             _release(file)
