@@ -85,6 +85,10 @@ class ImbalanceWarning(PorefvWarning):
     """A pressure that was found elsewhere leaves more of the flow out of balance than rounding explains."""
 
 
+class OutOfRangeWarning(PorefvWarning):
+    """Much of a flow is in throats of a kind that the conductance model was not tested on."""
+
+
 def vector(values: Iterable[float]) -> str:
     """Coordinates as shown in an error: ``0.5, 1, 0.25``."""
     return ", ".join(f"{value:.9g}" for value in values)

@@ -85,7 +85,7 @@ def run_everything(folder: Path) -> None:
     mesh = PoreMesh(packing)
     cell_strains(mesh, np.zeros((54, 3)), np.zeros(6)), mesh.volume_gradients
     cemented = PoreMesh(Packing(packing.centres, 1.3 * packing.radii, packing.box), wall_tolerance=1.0)
-    cemented.facets.volumes, cemented.cell_void_volumes
+    _ = cemented.facets.volumes, cemented.cell_void_volumes
     for made in (packing, Packing(packing.centres.copy(), packing.radii.copy(), packing.box)):
         for model in (None, HydraulicRadius()):
             flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)

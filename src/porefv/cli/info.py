@@ -97,6 +97,7 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("conductance", flow["conductance"]),
         ("inflow", f"{flow['inflow']:.6g} m³/s"),
         ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("outside tested range", _outside(summary.get("reliability"))),
         ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
     if "permeability" in summary:
@@ -105,6 +106,15 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
             ("hydraulic conductivity", f"{summary['hydraulic_conductivity']:.6g} m/s"),
         ]
     return rows
+
+
+def _outside(found: Mapping[str, float] | None) -> str | None:
+    """How much of the flow is where the model was not tested, if that is worth a word."""
+    if found is None or found["outside"] < 0.01:
+        return None
+    parts = {name.replace("_", " "): part for name, part in found.items() if name != "outside" and part >= 0.01}
+    kinds = ", ".join(f"{name} {100 * part:.0f} %" for name, part in parts.items())
+    return f"{100 * found['outside']:.0f} % of the dissipation ({kinds})"
 
 
 def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:

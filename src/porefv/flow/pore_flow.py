@@ -29,6 +29,7 @@ from porefv.flow.pressure import (
     solve_pressure,
 )
 from porefv.flow.pressure_on_grains import acting_pressure
+from porefv.flow.reliability import Reliability, reliability
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
@@ -289,6 +290,11 @@ class PoreFlow(FixedInputs):
         missing = float((holes * drop[doubtful] ** 2).sum())
         power = float((self.conductances * drop**2).sum())
         return missing / (power + missing) if missing > 0.0 else 0.0
+
+    @lazy_property
+    def reliability(self) -> Reliability:
+        """Parts of the dissipation in throats outside the range where the conductance model was tested."""
+        return reliability(self)
 
     # ---- forces -------------------------------------------------------------------------------------------------
 

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import ComputationError, printable
+from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
@@ -121,6 +123,8 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
         "unusual": _unusual(flow),
         "solver": {name: _known(value) for name, value in vars(flow.solver_report).items()},
     }
+    if flow.conductance.name == SectionFriction.name:  # what the range is of
+        found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity

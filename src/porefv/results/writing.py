@@ -12,6 +12,7 @@ A directory holds what was asked for of::
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -19,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.errors import InputError
+from porefv.conductance.section_friction.model import SectionFriction
+from porefv.errors import InputError, OutOfRangeWarning
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
 from porefv.flow.pore_flow import PoreFlow
@@ -168,6 +170,8 @@ def save(
             write_forces(flow, folder / FORCE_FILES[table_format])
         if vtk:
             _write_vtk(folder, mesh, flow, quantities)
+    if flow is not None and flow.conductance.name == SectionFriction.name and (said := flow.reliability.warning):
+        warnings.warn(said, OutOfRangeWarning, stacklevel=2)
     text = summary_json(
         mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds, scene=scene,
         packing=packing,
