@@ -8,6 +8,7 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.inscribed_spheres import InscribedSpheres, inscribed_spheres
 from porefv.mesh.throats import Throats
 from porefv.mesh.uniting import unite
 from porefv.packing.box import Box
@@ -108,6 +109,19 @@ class PoreMesh(CellMesh):
     def pore_volumes(self) -> np.ndarray:
         """(n_pores,): void volume of each pore [m³]."""
         return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
+
+    @lazy_property
+    def pore_points(self) -> np.ndarray:
+        """(n_pores, 3): Laguerre vertex of each pore, that of a united pore the mean of those of its cells [m]."""
+        if not self.n_united:
+            return self.vertices
+        count = np.bincount(self.cell_pore, minlength=self.n_pores)
+        return np.stack([np.bincount(self.cell_pore, x, self.n_pores) / count for x in self.vertices.T], axis=1)
+
+    @lazy_property
+    def inscribed_spheres(self) -> InscribedSpheres:
+        """The largest sphere that was found in the void of each pore, at or near its Laguerre vertices."""
+        return inscribed_spheres(self)
 
     @lazy_property
     def throats(self) -> Throats:

@@ -1,0 +1,128 @@
+"""The largest sphere that fits into the void of each pore, at or near its Laguerre vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from porefv.packing.packing import Packing
+
+if TYPE_CHECKING:
+    from porefv.mesh.pore_mesh import PoreMesh
+
+# Cells that are treated together: their arrays take some 100 MB.
+_CELLS = 1 << 18
+
+
+@dataclass(frozen=True, eq=False)
+class InscribedSpheres:
+    """A sphere in the void of each pore.
+
+    Attributes
+    ----------
+    centres : (n_pores, 3) array
+        Centre of each sphere [m].
+    radii : (n_pores,) array
+        0 where no sphere was found [m].
+    """
+
+    centres: np.ndarray
+    radii: np.ndarray
+
+
+def inscribed_spheres(mesh: PoreMesh) -> InscribedSpheres:
+    """The largest inscribed sphere of each pore among two candidates for each of its cells.
+
+    One candidate has its centre where the four vertices of the cell, spheres or walls, are equally far: it is tangent
+    to them (problem of Apollonius). The other has its centre at the Laguerre vertex of the cell. For equal spheres far
+    from walls the two are the same. The radius is the distance from the centre to the nearest sphere of the packing or
+    wall of the box, whichever they belong to, so that the sphere lies in the void. The centre may lie outside the pore.
+
+    Walls with slip confine the sphere like others.
+    """
+    radii = np.zeros(mesh.n_pores)
+    centres = np.zeros((mesh.n_pores, 3))
+    for first in range(0, mesh.n_cells, _CELLS):
+        cells = slice(first, first + _CELLS)
+        for points in (mesh.vertices[cells], _equally_far(mesh, mesh.cells[cells])):
+            found = clearances(mesh.packing, points)
+            pores = mesh.cell_pore[cells]
+            order = np.argsort(found, kind="stable")  # of several cells of a pore, the last one that is set is the best
+            better = order[found[order] > radii[pores[order]]]
+            radii[pores[better]] = found[better]
+            centres[pores[better]] = points[better]
+    without = radii == 0.0
+    centres[without] = mesh.pore_points[without]
+    return InscribedSpheres(centres, radii)
+
+
+def clearances(packing: Packing, points: np.ndarray) -> np.ndarray:
+    """Distance from each point to the nearest sphere or wall; 0 in the solid and beyond the walls.
+
+    Parameters
+    ----------
+    packing : Packing
+        With a box.
+    points : (k, 3) array
+        Those with a coordinate that is not finite have a distance of 0 [m].
+
+    Returns
+    -------
+    (k,) array [m]
+    """
+    from scipy.spatial import KDTree
+
+    assert packing.box is not None
+    nearest = packing.box.wall_distances(points).min(axis=1)
+    inside = np.flatnonzero(nearest > 0.0)
+    radii = packing.radii
+    # Spheres of similar radii together: a sphere that is farther by more than their difference is not the nearest.
+    classes = np.floor(np.log2(radii / radii.min())).astype(int)
+    for kind in np.unique(classes):
+        spheres = np.flatnonzero(classes == kind)
+        tree, largest = KDTree(packing.centres[spheres]), radii[spheres].max()
+        left, count = inside, 1
+        while len(left):
+            distances, found = tree.query(points[left], k=np.arange(1, count + 1))
+            nearest[left] = np.minimum(nearest[left], (distances - radii[spheres[found]]).min(axis=1))
+            left = left[(distances[:, -1] - largest < nearest[left]) & (count < len(spheres))]
+            count = min(4 * count, len(spheres))
+    return np.where(nearest > 0.0, nearest, 0.0)
+
+
+def _equally_far(mesh: PoreMesh, cells: np.ndarray) -> np.ndarray:
+    """(k, 3): the point equally far from the four vertices of each cell, spheres or walls; NaN where there is none [m].
+
+    With the first sphere's centre as origin and y = Y₀ + ρ Y₁ the point at distance ρ, its tangency to the three others
+    is linear in ρ, and to the first quadratic, as for the circles of `porefv.mesh.inscribed_circles`.
+    """
+    cells = np.sort(cells, axis=1)  # spheres come first: every cell has one
+    n, points, sizes = mesh.n_spheres, mesh.local_points, mesh.sizes
+    origin, r = points[cells[:, 0]], sizes[cells[:, 0]]
+    rows, constants, slopes = [], [], []
+    for vertex in cells[:, 1:].T:
+        wall = vertex >= n
+        towards = np.where(wall[:, None], points[vertex], points[vertex] - origin)
+        difference = r - sizes[vertex]
+        of_sphere = 0.5 * (_dot(towards, towards) + difference * (r + sizes[vertex]))
+        rows.append(towards)
+        constants.append(np.where(wall, sizes[vertex] - _dot(towards, origin), of_sphere))
+        slopes.append(np.where(wall, -1.0, difference))
+    a, b, c = rows
+    normals = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        inverse = normals / _dot(a, normals[0])[:, None]
+        y0 = (np.stack(constants)[:, :, None] * inverse).sum(axis=0)
+        y1 = (np.stack(slopes)[:, :, None] * inverse).sum(axis=0)
+        # |Y₀ + ρ Y₁| = r + ρ, as A ρ² + 2 B ρ + C = 0
+        qa, qb, qc = _dot(y1, y1) - 1.0, _dot(y0, y1) - r, _dot(y0, y0) - r**2
+        distance = qc / (np.sqrt(qb**2 - qa * qc) - qb)
+        found = origin + y0 + distance[:, None] * y1
+    found[~(distance > 0.0)] = np.nan
+    return found + mesh.triangulation.origin
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ij->i", a, b)
