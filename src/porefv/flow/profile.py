@@ -134,6 +134,4 @@ def plane_fluxes(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, axis: 
     begin = np.concatenate([of_pores[mesh.throats.pores[:, 0]], of_faces])
     end = np.concatenate([of_pores[mesh.throats.pores[:, 1]], of_pores[mesh.cell_pore[faces.cells]]])
     through = np.concatenate([flux, face_flux])
-    return np.array(
-        [through[(begin < z) & (end >= z)].sum() - through[(end < z) & (begin >= z)].sum() for z in places]
-    )
+    return np.array([through[(begin < z) & (end >= z)].sum() - through[(end < z) & (begin >= z)].sum() for z in places])

@@ -46,9 +46,9 @@ class Distribution:
         order = order[weights[order] > 0.0]
         if len(order) == 0:
             return cls(np.empty(0), np.empty(0), np.nan)
-        values, weights = values[order], weights[order] / weights.max()  # so that no sum overflows, or underflows
-        sums = np.cumsum(weights)
-        return cls(values, sums / sums[-1], float((weights * values).sum() / sums[-1]))
+        parts = weights[order] / weights.max()  # so that no sum overflows, or underflows
+        sums = np.cumsum(parts)
+        return cls(values[order], sums / sums[-1], float(np.dot(parts, values[order]) / sums[-1]))
 
     def quantile(self, fraction: float) -> float:
         """The smallest value that is not exceeded by this fraction of the weight; NaN without any weight.

@@ -119,6 +119,14 @@ class PoreMesh(CellMesh):
         return np.stack([np.bincount(self.cell_pore, x, self.n_pores) / count for x in self.vertices.T], axis=1)
 
     @lazy_property
+    def pore_walls(self) -> np.ndarray:
+        """(n_pores,) uint8: the walls on which each pore has a face, as the sum of 2^w over them (w = 0: x_min)."""
+        found = np.zeros(self.n_pores, np.uint8)
+        faces = self.wall_faces
+        np.bitwise_or.at(found, self.cell_pore[faces.cells], (1 << faces.walls).astype(np.uint8))
+        return found
+
+    @lazy_property
     def inscribed_spheres(self) -> InscribedSpheres:
         """The largest sphere that was found in the void of each pore, at or near its Laguerre vertices."""
         return inscribed_spheres(self)
