@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
-from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
+from porefv.cli import check, export, info, pack, plot, reference, simulate, solve, trade
 from porefv.cli.text import flush
 from porefv.errors import PorefvError, printable
 from porefv.system import memory
@@ -131,6 +131,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_CommandParser)
-    for command in (pack, solve, simulate, reference, trade, check, info, plot):
+    for command in (pack, solve, simulate, reference, trade, check, info, plot, export):
         command.register(commands)
     return parser

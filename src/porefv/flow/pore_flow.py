@@ -360,6 +360,12 @@ class PoreFlow(FixedInputs):
 
         return FipyProblem(self, FipyPoreMesh(self.mesh, ~np.isnan(self._held)))
 
+    def to_openpnm(self) -> dict[str, np.ndarray]:
+        """The network with its conductances in the names of OpenPNM (see `porefv.export.openpnm_network`)."""
+        from porefv.export.openpnm_network import flow_to_openpnm
+
+        return flow_to_openpnm(self)
+
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 
     def __repr__(self) -> str:

@@ -148,6 +148,12 @@ class PoreMesh(CellMesh):
 
         return FipyPoreMesh(self, held)
 
+    def to_openpnm(self) -> dict[str, np.ndarray]:
+        """The pores and throats as a plain dictionary in the names of OpenPNM (see `porefv.export.openpnm_network`)."""
+        from porefv.export.openpnm_network import mesh_to_openpnm
+
+        return mesh_to_openpnm(self)
+
     def __repr__(self) -> str:
         return (
             f"PoreMesh({self.n_spheres} spheres, {self.n_pores} pores, {len(self.throats)} throats, "
