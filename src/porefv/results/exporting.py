@@ -25,8 +25,10 @@ from porefv.system.atomic_files import atomic_write, locked
 MESH_FORMATS = {
     "f3grid": "flac3d", "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk", "vtu": "vtu",
 }  # fmt: skip
-# Those that have a place for fields. Others get the number of the pore, of which some make a label of the cells.
-_WITH_FIELDS = ("msh", "vtk", "vtu")
+# Those that get the fields. The others get the number of the pore, which some write as a label of the cells. Gmsh wants
+# labels of its own, and meshio cannot read files of Gmsh that have both these and fields.
+_WITH_FIELDS = ("vtk", "vtu")
+_GMSH_LABELS = ("gmsh:physical", "gmsh:geometrical")
 FORMATS = ("openpnm", "csv", *MESH_FORMATS)
 
 
@@ -42,7 +44,7 @@ def export(results: Results, path: str | PathLike[str], to: str, *, force: bool 
         of the format.
     to : str
         One of `FORMATS`. "openpnm": the arrays of `openpnm_network`, by name. "csv": pores.csv and throats.csv. Others:
-        the mesh of the pores, written by meshio; "msh", "vtk" and "vtu" have its fields as cell data.
+        the mesh of the pores, written by meshio; "vtk" and "vtu" have its fields as cell data.
     force : bool
         Replace files that exist.
 
@@ -145,6 +147,8 @@ def _writers(results: Results, path: Path, to: str) -> dict[Path, Callable[[Path
     mesh = meshio_from_vtk(results.pores)
     if to not in _WITH_FIELDS:
         mesh.cell_data = {"pore": mesh.cell_data["pore"]}
+    if to == "msh":
+        mesh.cell_data = dict.fromkeys(_GMSH_LABELS, [np.ones(len(block.data), int) for block in mesh.cells])
     return {path: lambda temporary: mesh.write(temporary, file_format=MESH_FORMATS[to])}
 
 
