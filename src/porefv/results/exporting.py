@@ -148,7 +148,7 @@ def _writers(results: Results, path: Path, to: str) -> dict[Path, Callable[[Path
     if to not in _WITH_FIELDS:
         mesh.cell_data = {"pore": mesh.cell_data["pore"]}
     if to == "msh":
-        mesh.cell_data = dict.fromkeys(_GMSH_LABELS, [np.ones(len(block.data), int) for block in mesh.cells])
+        mesh.cell_data = {key: [np.ones(len(block.data), int) for block in mesh.cells] for key in _GMSH_LABELS}
     return {path: lambda temporary: mesh.write(temporary, file_format=MESH_FORMATS[to])}
 
 
