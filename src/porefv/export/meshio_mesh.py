@@ -57,6 +57,9 @@ def to_meshio(mesh: CellMesh, **cell_data: Any) -> meshio.Mesh:
 def meshio_from_vtk(grid: pyvista.UnstructuredGrid) -> meshio.Mesh:
     """The cells of pores.vtu with their cell data as a `meshio.Mesh`, in blocks of one type.
 
+    Nodes are in the order of meshio, which is that of Gmsh and Abaqus: before it writes a VTK file, see
+    `mirror_wedges`.
+
     Raises
     ------
     MissingExtraError
@@ -67,11 +70,17 @@ def meshio_from_vtk(grid: pyvista.UnstructuredGrid) -> meshio.Mesh:
     for kind, name in NAMES.items():
         cells = np.flatnonzero(grid.celltypes == kind)
         if len(cells):
-            nodes = np.asarray(grid.cells_dict[np.uint8(kind)])
-            blocks.append((name, nodes[:, _WEDGE_NODES] if kind == WEDGE else nodes))
+            blocks.append((name, grid.cells_dict[np.uint8(kind)]))
             for array, parts in data.items():
                 parts.append(np.asarray(grid.cell_data[array])[cells])
     return meshio.Mesh(np.asarray(grid.points), blocks, cell_data=data)
+
+
+def mirror_wedges(mesh: meshio.Mesh) -> None:
+    """Exchange nodes of the wedges of a mesh, so that they are right in VTK files that meshio writes."""
+    for block in mesh.cells:
+        if block.type == "wedge":
+            block.data = block.data[:, _WEDGE_NODES]
 
 
 def _meshio(purpose: str) -> Any:

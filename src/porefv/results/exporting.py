@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from porefv.errors import FORCE_OPTION, InputError
-from porefv.export.meshio_mesh import meshio_from_vtk
+from porefv.export.meshio_mesh import meshio_from_vtk, mirror_wedges
 from porefv.export.openpnm_network import openpnm_network
 from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS
@@ -25,9 +25,9 @@ from porefv.system.atomic_files import atomic_write, locked
 MESH_FORMATS = {
     "f3grid": "flac3d", "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk", "vtu": "vtu",
 }  # fmt: skip
-# Those that get the fields. The others get the number of the pore, which some write as a label of the cells. Gmsh wants
+# VTK files get the fields. The others get the number of the pore, which some write as a label of the cells. Gmsh wants
 # labels of its own, and meshio cannot read files of Gmsh that have both these and fields.
-_WITH_FIELDS = ("vtk", "vtu")
+_VTK_FILES = ("vtk", "vtu")
 _GMSH_LABELS = ("gmsh:physical", "gmsh:geometrical")
 FORMATS = ("openpnm", "csv", *MESH_FORMATS)
 
@@ -145,7 +145,9 @@ def _writers(results: Results, path: Path, to: str) -> dict[Path, Callable[[Path
         network = to_openpnm(results)
         return {path: lambda temporary: np.savez_compressed(temporary, allow_pickle=False, **network)}
     mesh = meshio_from_vtk(results.pores)
-    if to not in _WITH_FIELDS:
+    if to in _VTK_FILES:
+        mirror_wedges(mesh)
+    else:
         mesh.cell_data = {"pore": mesh.cell_data["pore"]}
     if to == "msh":
         mesh.cell_data = {key: [np.ones(len(block.data), int) for block in mesh.cells] for key in _GMSH_LABELS}
