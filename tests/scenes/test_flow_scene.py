@@ -210,7 +210,7 @@ BAD = {
     "unknown key of a wall": ("pressure = 1", "presure = 1", "line 5: .walls.y_min. unknown key 'presure'"),
     "unknown solver": ('"auto"', '"dirct"', "line 8: .flow. solver: unknown solver 'dirct'; did"),
     "unknown model": ('solver = "auto"', 'conductance = "square"', "unknown conductance 'square'; known"),
-    "unknown quantity": ('"permeability"', '"velocity"', "line 10: .output. quantities: 'velocity'"),
+    "unknown quantity": ('"permeability"', '"vorticity"', "line 10: .output. quantities: 'vorticity'"),
     "quantities not a list": ('["permeability"]', '"permeability"', "expected a list"),
     "no viscosity": ("1.0e-3", "0.0", "line 3: .fluid. viscosity must be a positive"),
     "negative viscosity": ("1.0e-3", "-1", "viscosity must be a positive"),

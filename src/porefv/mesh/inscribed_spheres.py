@@ -1,4 +1,4 @@
-"""The largest sphere that fits into the void of each pore, at or near its Laguerre vertices."""
+"""The largest sphere that was found in the void of each pore, at or near its Laguerre vertex."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from porefv.mesh.inscribed_circles import Circles, inscribed_circles
 from porefv.packing.packing import Packing
+from porefv.system.threads import for_rows
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
 
-# Cells that are treated together: their arrays take some 100 MB.
-_CELLS = 1 << 18
+# Cells or facets that are treated together: their arrays take some 100 MB.
+_ROWS = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,29 +35,45 @@ class InscribedSpheres:
 
 
 def inscribed_spheres(mesh: PoreMesh) -> InscribedSpheres:
-    """The largest inscribed sphere of each pore among two candidates for each of its cells.
+    """The largest inscribed sphere of each pore among the candidates of its cells and facets.
 
-    One candidate has its centre where the four vertices of the cell, spheres or walls, are equally far: it is tangent
-    to them (problem of Apollonius). The other has its centre at the Laguerre vertex of the cell. For equal spheres far
-    from walls the two are the same. The radius is the distance from the centre to the nearest sphere of the packing or
-    wall of the box, whichever they belong to, so that the sphere lies in the void. The centre may lie outside the pore.
-
-    Walls with slip confine the sphere like others.
+    The candidate of a cell has its centre where the four vertices of the cell, spheres or walls, are equally far: it is
+    tangent to them (problem of Apollonius). For equal spheres, away from walls, this is the Laguerre vertex; else it is
+    near. The candidates of a pore's facets have their centres at those of the inscribed circles: where a void becomes
+    wider towards a neighbour, no sphere is tangent to all four. The radius is the distance from the centre to the
+    nearest sphere of the packing or wall of the box, whichever they belong to, so that the sphere lies in the void. The
+    centre may lie outside the pore. Walls with slip confine the sphere like others.
     """
-    radii = np.zeros(mesh.n_pores)
-    centres = np.zeros((mesh.n_pores, 3))
-    for first in range(0, mesh.n_cells, _CELLS):
-        cells = slice(first, first + _CELLS)
-        for points in (mesh.vertices[cells], _equally_far(mesh, mesh.cells[cells])):
-            found = clearances(mesh.packing, points)
-            pores = mesh.cell_pore[cells]
-            order = np.argsort(found, kind="stable")  # of several cells of a pore, the last one that is set is the best
-            better = order[found[order] > radii[pores[order]]]
-            radii[pores[better]] = found[better]
-            centres[pores[better]] = points[better]
-    without = radii == 0.0
-    centres[without] = mesh.pore_points[without]
-    return InscribedSpheres(centres, radii)
+    found = InscribedSpheres(np.zeros((mesh.n_pores, 3)), np.zeros(mesh.n_pores))
+    for first in range(0, mesh.n_cells, _ROWS):
+        cells = slice(first, first + _ROWS)
+        points = _equally_far(mesh, mesh.cells[cells])
+        _keep_better(found, mesh.cell_pore[cells], points, clearances(mesh.packing, points))
+    facets = mesh.facets
+    circles = Circles(np.empty(len(facets)), np.empty((len(facets), 3)))
+    for_rows(
+        inscribed_circles, len(facets), facets.vertices, mesh.cell_vertices, np.zeros(6, bool), circles
+    )  # fmt: skip
+    pores = mesh.cell_pore[facets.cells]
+    # No sphere with its centre at that of a circle is larger than the circle.
+    useful = np.flatnonzero(circles.radii > found.radii[pores].min(axis=1))
+    for first in range(0, len(useful), _ROWS):
+        rows = useful[first : first + _ROWS]
+        points = circles.centres[rows] + mesh.triangulation.origin
+        radii = clearances(mesh.packing, points)
+        for side in (0, 1):
+            _keep_better(found, pores[rows, side], points, radii)
+    without = found.radii == 0.0
+    found.centres[without] = mesh.pore_points[without]
+    return found
+
+
+def _keep_better(found: InscribedSpheres, pores: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> None:
+    """Take candidates of pores in place of what was found, where they are larger."""
+    order = np.argsort(radii, kind="stable")  # of several candidates of a pore, the last one that is set is the best
+    better = order[radii[order] > found.radii[pores[order]]]
+    found.radii[pores[better]] = radii[better]
+    found.centres[pores[better]] = centres[better]
 
 
 def clearances(packing: Packing, points: np.ndarray) -> np.ndarray:

@@ -143,7 +143,7 @@ def _writers(results: Results, path: Path, to: str) -> dict[Path, Callable[[Path
         raise InputError(f"cannot write {path}: files of {to} need a name that ends in .{extension}")
     if to == "openpnm":
         network = to_openpnm(results)
-        return {path: lambda temporary: np.savez_compressed(temporary, allow_pickle=False, **network)}
+        return {path: lambda temporary: np.savez_compressed(temporary, **network)}
     mesh = meshio_from_vtk(results.pores)
     if to in _VTK_FILES:
         mirror_wedges(mesh)
