@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
@@ -40,7 +40,7 @@ def test_porosities_weighted_with_the_layers_add_up_to_that_of_the_packing(rando
     edges = layer_edges(packing.box, axis, layers)
     porosities = layer_porosities(packing, axis, edges)
     assert_allclose(np.average(porosities, weights=np.diff(edges)), packing.porosity, rtol=0, atol=1e-13)
-    assert ((porosities >= -1e-13) & (porosities <= 1.0)).all()
+    assert ((porosities >= -1e-13) & (porosities <= 1.0 + 1e-13)).all()
 
 
 @pytest.mark.parametrize("name", ["n54_s1", "n200_s1", "nine_0.72", "sc8"])
@@ -52,6 +52,7 @@ def test_they_add_up_with_overlaps_and_spheres_across_walls(reference, name, axi
     assert_allclose(np.average(porosities, weights=np.diff(edges)), packing.porosity, rtol=0, atol=1e-13)
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.floats(0.0, 1.0), st.floats(0.02, 0.99))
 def test_the_union_of_two_spheres_is_cut_exactly(seed, tilt, lower):
     # Two spheres that overlap, at any angle to the planes, against an integral of the area of their sections.
@@ -62,7 +63,12 @@ def test_the_union_of_two_spheres_is_cut_exactly(seed, tilt, lower):
     step = direction * rng.uniform(radii.max() * 1.01, radii.sum())
     packing = Packing([0.5 - step / 2, 0.5 + step / 2], radii, UNIT)
     upper = lower + 0.5 * (1.0 - lower)
-    breaks = np.sort([c + s * r for c, r in zip(packing.centres[:, 1], radii, strict=True) for s in (-1, 1)])
+    # The section has kinks at the ends of the spheres, and of the circle in which they meet.
+    distance = np.linalg.norm(step)
+    to_plane = (distance**2 + radii[0] ** 2 - radii[1] ** 2) / (2 * distance)
+    extent = np.sqrt((radii[0] ** 2 - to_plane**2) * (1 - direction[1] ** 2))
+    middles, extents = [*packing.centres[:, 1], packing.centres[0, 1] + to_plane * direction[1]], [*radii, extent]
+    breaks = np.concatenate([np.subtract(middles, extents), np.add(middles, extents)])
     within = breaks[(breaks > lower) & (breaks < upper)]
 
     def section(y):
@@ -70,7 +76,7 @@ def test_the_union_of_two_spheres_is_cut_exactly(seed, tilt, lower):
 
     solid = quad(section, lower, upper, points=within if len(within) else None, epsabs=1e-11, limit=400)[0]
     found = layer_porosities(packing, 1, [0.0, lower, upper, 1.0])[1]
-    assert_allclose((1.0 - found) * (upper - lower), solid, rtol=0, atol=1e-8)
+    assert_allclose((1.0 - found) * (upper - lower), solid, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("axis", range(3))
