@@ -9,7 +9,7 @@ from typing import Any
 from porefv.cli.text import path_text, say
 
 # As `porefv.results.exporting.FORMATS`, which would be slow to import for the help.
-FORMATS = ("openpnm", "csv", "f3grid", "inp", "mesh", "msh", "nas", "vtk", "vtu")
+FORMATS = ("openpnm", "csv", "inp", "mesh", "msh", "nas", "vtk", "vtu")
 
 
 def register(commands: Any) -> None:

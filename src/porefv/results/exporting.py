@@ -23,7 +23,7 @@ from porefv.system.atomic_files import atomic_write, locked
 
 # meshio's name of the format for each extension: formats that are one file and have all cells.
 MESH_FORMATS = {
-    "f3grid": "flac3d", "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk", "vtu": "vtu",
+    "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk", "vtu": "vtu",
 }  # fmt: skip
 # VTK files get the fields. The others get the number of the pore, which some write as a label of the cells. Gmsh wants
 # labels of its own, and meshio cannot read files of Gmsh that have both these and fields.
