@@ -88,3 +88,9 @@ def test_export_says_what_it_wants(solved, arguments, capsys):
         main(["export", str(solved), *arguments])
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("usage: porefv export ")
+
+
+def test_plot_of_a_quantity_refuses_a_simulation(tmp_path, capsys):
+    (tmp_path / "simulation.json").write_text("{}")
+    assert main(["plot", str(tmp_path), "--what", "profile", "--out", str(tmp_path / "a.png")]) == 2
+    assert "--what is for results of porefv solve" in capsys.readouterr().err
