@@ -9,13 +9,15 @@ import numpy as np
 
 from porefv.mesh.inscribed_circles import Circles, inscribed_circles
 from porefv.packing.packing import Packing
-from porefv.system.threads import for_rows
+from porefv.system.threads import for_rows, thread_count
 
 if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
 
 # Cells or facets that are treated together: their arrays take some 100 MB.
 _ROWS = 1 << 18
+# Among so many of the nearest centres is, for most points, the nearest surface.
+_NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +103,9 @@ def clearances(packing: Packing, points: np.ndarray) -> np.ndarray:
     for kind in np.unique(classes):
         spheres = np.flatnonzero(classes == kind)
         tree, largest = KDTree(packing.centres[spheres]), radii[spheres].max()
-        left, count = inside, 1
+        left, count = inside, min(_NEIGHBOURS, len(spheres))
         while len(left):
-            distances, found = tree.query(points[left], k=np.arange(1, count + 1))
+            distances, found = tree.query(points[left], k=np.arange(1, count + 1), workers=thread_count())
             nearest[left] = np.minimum(nearest[left], (distances - radii[spheres[found]]).min(axis=1))
             left = left[(distances[:, -1] - largest < nearest[left]) & (count < len(spheres))]
             count = min(4 * count, len(spheres))
