@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from porefv.mesh.inscribed_spheres import clearances
+from porefv.mesh.inscribed_spheres import NearestSurface
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
@@ -73,10 +73,12 @@ def test_radii_scale_with_the_packing_and_do_not_depend_on_its_place(random_pack
 
 
 @given(st.integers(0, 10_000))
-def test_clearances_are_the_distances_from_all_spheres_and_walls(random_packing, seed):
+def test_the_nearest_surface_is_the_nearest_of_all_spheres_and_walls(random_packing, seed):
     packing = random_packing(60, ratio=0.03, seed=seed)
     points = np.random.default_rng(seed).uniform(-0.1, 1.1, (200, 3))
-    assert_allclose(clearances(packing, points), np.maximum(distances(packing, points), 0.0), rtol=0, atol=1e-14)
+    assert_allclose(
+        NearestSurface(packing).distances(points), np.maximum(distances(packing, points), 0.0), rtol=0, atol=1e-14
+    )
 
 
 def test_walls_of_pores_are_those_on_which_they_have_faces(mesh_of):

@@ -47,10 +47,11 @@ def inscribed_spheres(mesh: PoreMesh) -> InscribedSpheres:
     centre may lie outside the pore. Walls with slip confine the sphere like others.
     """
     found = InscribedSpheres(np.zeros((mesh.n_pores, 3)), np.zeros(mesh.n_pores))
+    surface = NearestSurface(mesh.packing)
     for first in range(0, mesh.n_cells, _ROWS):
         cells = slice(first, first + _ROWS)
         points = _equally_far(mesh, mesh.cells[cells])
-        _keep_better(found, mesh.cell_pore[cells], points, clearances(mesh.packing, points))
+        _keep_better(found, mesh.cell_pore[cells], points, surface.distances(points))
     facets = mesh.facets
     circles = Circles(np.empty(len(facets)), np.empty((len(facets), 3)))
     for_rows(
@@ -62,7 +63,7 @@ def inscribed_spheres(mesh: PoreMesh) -> InscribedSpheres:
     for first in range(0, len(useful), _ROWS):
         rows = useful[first : first + _ROWS]
         points = circles.centres[rows] + mesh.triangulation.origin
-        radii = clearances(mesh.packing, points)
+        radii = surface.distances(points)
         for side in (0, 1):
             _keep_better(found, pores[rows, side], points, radii)
     without = found.radii == 0.0
@@ -78,38 +79,37 @@ def _keep_better(found: InscribedSpheres, pores: np.ndarray, centres: np.ndarray
     found.centres[pores[better]] = centres[better]
 
 
-def clearances(packing: Packing, points: np.ndarray) -> np.ndarray:
-    """Distance from each point to the nearest sphere or wall; 0 in the solid and beyond the walls.
+class NearestSurface:
+    """Distances of points from the nearest sphere or wall of a packing.
 
     Parameters
     ----------
     packing : Packing
         With a box.
-    points : (k, 3) array
-        Those with a coordinate that is not finite have a distance of 0 [m].
-
-    Returns
-    -------
-    (k,) array [m]
     """
-    from scipy.spatial import KDTree
 
-    assert packing.box is not None
-    nearest = packing.box.wall_distances(points).min(axis=1)
-    inside = np.flatnonzero(nearest > 0.0)
-    radii = packing.radii
-    # Spheres of similar radii together: a sphere that is farther by more than their difference is not the nearest.
-    classes = np.floor(np.log2(radii / radii.min())).astype(int)
-    for kind in np.unique(classes):
-        spheres = np.flatnonzero(classes == kind)
-        tree, largest = KDTree(packing.centres[spheres]), radii[spheres].max()
-        left, count = inside, min(_NEIGHBOURS, len(spheres))
-        while len(left):
-            distances, found = tree.query(points[left], k=np.arange(1, count + 1), workers=thread_count())
-            nearest[left] = np.minimum(nearest[left], (distances - radii[spheres[found]]).min(axis=1))
-            left = left[(distances[:, -1] - largest < nearest[left]) & (count < len(spheres))]
-            count = min(4 * count, len(spheres))
-    return np.where(nearest > 0.0, nearest, 0.0)
+    def __init__(self, packing: Packing):
+        from scipy.spatial import KDTree
+
+        assert packing.box is not None
+        self._box = packing.box
+        # Spheres of similar radii together: a centre that is farther by more than their difference is not the nearest.
+        classes = np.floor(np.log2(packing.radii / packing.radii.min())).astype(int)
+        parts = [classes == kind for kind in np.unique(classes)]
+        self._trees = [(KDTree(packing.centres[part]), packing.radii[part]) for part in parts]
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """(k,): distance of each point (k, 3); 0 in the solid, beyond the walls, and for NaN [m]."""
+        nearest = self._box.wall_distances(points).min(axis=1)
+        inside = np.flatnonzero(nearest > 0.0)
+        for tree, radii in self._trees:
+            left, count = inside, min(_NEIGHBOURS, len(radii))
+            while len(left):
+                lengths, found = tree.query(points[left], k=np.arange(1, count + 1), workers=thread_count())
+                nearest[left] = np.minimum(nearest[left], (lengths - radii[found]).min(axis=1))
+                left = left[(lengths[:, -1] - radii.max() < nearest[left]) & (count < len(radii))]
+                count = min(4 * count, len(radii))
+        return np.where(nearest > 0.0, nearest, 0.0)
 
 
 def _equally_far(mesh: PoreMesh, cells: np.ndarray) -> np.ndarray:

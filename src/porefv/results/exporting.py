@@ -142,7 +142,7 @@ def _writers(results: Results, path: Path, to: str) -> dict[Path, Callable[[Path
     if path.suffix != f".{extension}":
         raise InputError(f"cannot write {path}: files of {to} need a name that ends in .{extension}")
     if to == "openpnm":
-        network = to_openpnm(results)
+        network: dict[str, Any] = to_openpnm(results)
         return {path: lambda temporary: np.savez_compressed(temporary, **network)}
     mesh = meshio_from_vtk(results.pores)
     if to in _VTK_FILES:
