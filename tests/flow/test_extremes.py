@@ -531,7 +531,7 @@ def solving(project, **options):
 @pytest.mark.parametrize("after", [0.0, 0.2, 0.6])
 def test_an_interruption_leaves_what_existed_and_nothing_half_written(project, after):
     process = solving(project)
-    while process.poll() is None and not list(project.glob(".results-*")):
+    while process.poll() is None and not list(project.glob(".results.porefv-new")):
         time.sleep(0.002)  # until the temporary folder stands: the interruption must clear it away
     time.sleep(after)
     process.send_signal(signal.SIGINT)

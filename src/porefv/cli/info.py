@@ -47,7 +47,7 @@ def summary_text(results: Results) -> str:
     """
     try:
         return _summary_text(results)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{results.directory}: summary.json is damaged: {reason}. Solve again.") from None
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import ComputationError
+from porefv.errors import ComputationError, printable
 from porefv.packing.box import WALLS
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
@@ -61,9 +61,9 @@ def summary_json(
     """
     summary = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "scene": scene,
+        "scene": scene and printable(scene),
         "quantities": list(quantities),
-        "packing": {"file": packing, **_packing(mesh)},
+        "packing": {"file": packing and printable(packing), **_packing(mesh)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
         **sample,

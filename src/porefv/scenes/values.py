@@ -190,6 +190,8 @@ def _in_folder(text: str, info: core_schema.ValidationInfo) -> Path:
 def _without_zero_byte(text: str) -> str:
     if "\0" in text:
         raise ValueError(f"a zero byte stands in {text!r}, which no name can hold")
+    if "\n" in text or "\r" in text:
+        raise ValueError(f"a line break stands in {text!r}; give a name in one line")
     return text
 
 
