@@ -171,7 +171,7 @@ def test_only_what_was_asked_for_is_written(flow, tmp_path):
 def test_meshes_without_pressure_have_none(flow, tmp_path):
     pytest.importorskip("pyvista")
     found = results.read(results.write(flow, tmp_path / "k", quantities=["permeability"]))
-    assert set(found.pores.cell_data) == {"pore", "volume"}
+    assert set(found.pores.cell_data) == {"pore", "volume", "walls"}
     assert set(found.spheres.point_data) == {"id", "radius"}
 
 

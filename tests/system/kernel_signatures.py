@@ -28,7 +28,11 @@ fluid = {{ viscosity = 1.0, density = 1000.0 }}
 walls = {{ y_min = {{ pressure = 1.0 }}, y_max = {{ pressure = 0.0 }}, lateral = {{ slip = {slip} }} }}
 mesh = {{ unite_tolerance = {unite} }}
 flow = {{ conductance = "{model}", solver = "{solver}", gravity = [0.0, 0.0, -9.81] }}
-output = {{ directory = "results/flow", quantities = ["permeability", "pressure", "forces"], vtk = true }}
+
+[output]
+directory = "results/flow"
+quantities = ["permeability", "pressure", "forces", "profile", "pore_sizes", "constriction_sizes", "planes"]
+vtk = true
 """
 FLOWS = [
     {"packing": packing, "slip": slip, "unite": unite, "model": model, "solver": solver}

@@ -71,6 +71,7 @@ def _summary_text(results: Results) -> str:
             *((name.replace("_", " "), count_text(count)) for name, count in unusual.items() if count),
         ]),
         ("Flow", _flow_rows(summary)),
+        ("Sample", _sample_rows(summary)),
         ("Forces on the spheres", _force_rows(summary)),
         ("Computation", [
             *_solver_rows(summary),
@@ -115,6 +116,42 @@ def _outside(found: Mapping[str, float] | None) -> str | None:
     parts = {name.replace("_", " "): part for name, part in found.items() if name != "outside" and part >= 0.01}
     kinds = ", ".join(f"{name} {100 * part:.0f} %" for name, part in parts.items())
     return f"{100 * found['outside']:.0f} % of the dissipation ({kinds})"
+
+
+def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """The quantities of the sample besides permeability and forces."""
+    rows: list[tuple[str, Any]] = []
+    if "tortuosity" in summary:
+        tortuosity = summary["tortuosity"]
+        rows.append(("tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}"))
+    if "velocity" in summary:
+        rows += [
+            ("Darcy velocity", f"({vector_text(summary['velocity']['darcy'])}) m/s"),
+            ("interstitial velocity", f"({vector_text(summary['velocity']['interstitial'])}) m/s"),
+        ]
+    if "profile" in summary:
+        profile = summary["profile"]
+        layers = f"{count_text(profile['layers'])} layers along {profile['axis']}"
+        rows.append(("profile", f"{layers}, porosity {range_text(profile['porosity'])}"))
+    for name, title, weights in (
+        ("pore_sizes", "pore radius", {"by_number": "by number", "by_volume": "by void volume"}),
+        ("constriction_sizes", "constriction radius", {"by_number": "by number", "by_flux": "by flux"}),
+    ):
+        rows += [
+            (f"{title}, {words}", _radii(summary[name][kind])) for kind, words in weights.items() if name in summary
+        ]
+    if summary.get("planes", {}).get("flux"):
+        planes = summary["planes"]
+        count = f"{count_text(planes['planes'])} planes along {planes['axis']}"
+        fluxes = dict.fromkeys(f"{flux:.6g}" for flux in planes["flux"])  # one, where they are the same
+        rows.append(("flux through planes", f"{' to '.join(fluxes)} m³/s, {count}"))
+    return rows
+
+
+def _radii(found: Mapping[str, float | None]) -> str:
+    if found["mean"] is None:
+        return "none"
+    return f"median {found['r50']:.4g} m, 10 % below {found['r10']:.4g} m, 90 % below {found['r90']:.4g} m"
 
 
 def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
+from porefv.cli import check, export, info, pack, plot, reference, simulate, solve, trade
 from porefv.cli.text import flush, say
 from porefv.errors import InputError, PorefvError, printable
 from porefv.system import memory
@@ -154,6 +154,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_CommandParser)
-    for command in (pack, solve, simulate, reference, trade, check, info, plot):
+    for command in (pack, solve, simulate, reference, trade, check, info, plot, export):
         command.register(commands)
     return parser

@@ -71,13 +71,8 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
 
     Points are Laguerre vertices, that of a united pore the mean of several.
     """
-    mesh = throats.mesh
-    points = mesh.vertices
-    if mesh.n_united:
-        count = np.bincount(mesh.cell_pore, minlength=mesh.n_pores)
-        points = np.stack([np.bincount(mesh.cell_pore, x, mesh.n_pores) / count for x in points.T], axis=1)
     polydata = vtk_data_model().vtkPolyData()
-    polydata.SetPoints(vtk_points(points))
+    polydata.SetPoints(vtk_points(throats.mesh.pore_points))
     polydata.SetLines(cell_array(throats.pores))
     attach(polydata.GetCellData(), cell_data, len(throats))
     return polydata

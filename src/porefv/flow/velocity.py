@@ -1,4 +1,4 @@
-"""Mean velocities of the fluid in the pores, from the fluxes on their faces."""
+"""Mean velocities of the fluid, in each pore and in the sample, from the fluxes on the faces."""
 
 from __future__ import annotations
 
@@ -40,3 +40,24 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
         )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)
+
+
+def darcy_velocity(mesh: PoreMesh, face_flux: np.ndarray) -> np.ndarray:
+    """Mean of the velocity over the box, grains at rest included: ∫ u dV = ∮ x (u·n) dS over the walls.
+
+    Between two opposite walls its component along their axis is Q / S.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    face_flux : (w,) array
+        Flux into the sample through each wall face, taken to pass at its centroid [m³/s].
+
+    Returns
+    -------
+    (3,) array [m/s]
+    """
+    box = mesh.box
+    # From the middle of the box, so that an imbalance of the fluxes has the least effect.
+    middle = 0.5 * (box.lower + box.upper) - mesh.triangulation.origin
+    return -(face_flux[:, None] * (mesh.wall_faces.centroids - middle)).sum(axis=0) / box.volume

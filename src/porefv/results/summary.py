@@ -28,6 +28,8 @@ UNITS = {
     "permeability": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
     "wall_flux": "m3/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
+    "pore_sizes": "m", "constriction_sizes": "m", "velocity": "m/s", "planes": "m3/s", "tortuosity": "1",
+    "profile": "1",
 }  # fmt: skip
 
 
@@ -39,6 +41,7 @@ def summary_json(
     vtk: bool,
     table_format: str,
     seconds: Mapping[str, float],
+    sample: Mapping[str, Any],
     scene: str | None = None,
     packing: str | None = None,
 ) -> str:
@@ -53,6 +56,8 @@ def summary_json(
         What was asked for.
     seconds : mapping of str to float
         Wall time of each stage.
+    sample : mapping
+        What `quantity_summaries` returns.
     scene, packing : str, optional
         Names of the files.
     """
@@ -63,6 +68,7 @@ def summary_json(
         "packing": {"file": packing and printable(packing), **_packing(mesh)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
+        **sample,
         "seconds": {**seconds, "total": sum(seconds.values())},
         "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
         "units": UNITS,

@@ -16,6 +16,7 @@ from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
+from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.errors import refused
 from porefv.scenes.shared_tables import (
@@ -28,7 +29,7 @@ from porefv.scenes.shared_tables import (
     SixWalls,
 )
 from porefv.scenes.table import MadeFrom, Scene, Table
-from porefv.scenes.values import Choice, Choices, Limits, ScenePath, Vector, key
+from porefv.scenes.values import Choice, Choices, Limits, Numbers, ScenePath, Vector, Whole, key
 from porefv.solvers.solver import SOLVERS, TOLERANCE
 from porefv.system.progress import Progress
 from porefv.system.tables import TABLE_FORMATS
@@ -105,7 +106,9 @@ class FlowOutput(Table):
         "results",
     )
     quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
-        'what is computed: any of `"permeability"`, `"pressure"`, `"forces"`. An empty list computes the pores alone',
+        'what is computed: any of `"permeability"`, `"pressure"`, `"forces"`, and of the '
+        '[quantities of the sample](quantities.md) `"profile"`, `"pore_sizes"`, `"constriction_sizes"`, '
+        '`"tortuosity"`, `"velocity"`, `"planes"`. An empty list computes the pores alone',
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
@@ -114,6 +117,18 @@ class FlowOutput(Table):
         "pyarrow",
         "csv",
     )
+    axis: Annotated[str, Choice(("x", "y", "z"))] | None = key(
+        'axis normal to the layers and planes: `"x"`, `"y"` or `"z"`', None, shown="the axis of flow"
+    )
+    layers: Annotated[int, Whole(least=1)] = key('number of equally thick layers of `"profile"`', 10)
+    planes: Annotated[tuple[float, ...], Numbers("a list of finite numbers such as [0.25, 0.5]")] | None = key(
+        'places of `"planes"` along the axis, inside the box', None, unit="m", shown="between the layers"
+    )
+
+    @property
+    def sections(self) -> Sections:
+        """Layers and planes."""
+        return Sections(self.axis, self.layers, self.planes)
 
 
 class FlowScene(Scene):
@@ -165,6 +180,17 @@ class FlowScene(Scene):
             raise refused(
                 "permeability needs exactly two pressure walls, opposite each other and at "
                 f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
+            )
+        for quantity in ("profile", "planes"):
+            if quantity in asked and axis is None and self.output.axis is None:
+                raise refused(
+                    f"{quantity} needs an axis, and the pressure walls are not one pair of opposite walls. "
+                    'Give in [output] for instance\naxis = "y"'
+                )
+        if "tortuosity" in asked and axis is None:
+            raise refused(
+                "tortuosity needs exactly two pressure walls, opposite each other. Change [walls], or drop it from "
+                "the quantities."
             )
         return self
 
@@ -223,10 +249,12 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
+            output.sections.check(output.quantities, self.walls, mesh.box)
             flow = self.pore_flow(mesh) if output.quantities else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
-                progress=progress, scene=str(self.path) if self.path else None, packing=str(self.packing.file),
+                sections=output.sections, progress=progress, scene=str(self.path) if self.path else None,
+                packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
 
@@ -244,4 +272,6 @@ class FlowScene(Scene):
             As `solve`, save that results may exist.
         """
         check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
-        return self.pore_mesh().packing
+        mesh = self.pore_mesh()
+        self.output.sections.check(self.output.quantities, self.walls, mesh.box)
+        return mesh.packing
