@@ -89,6 +89,7 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "porosity": packing.porosity,
         "porosity_error": packing.porosity_error,
         "pore_volume": packing.porosity * mesh.box.volume,
+        "reading": None if packing.reading is None else packing.reading.as_data(),
     }
 
 

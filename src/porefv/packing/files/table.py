@@ -1,0 +1,205 @@
+"""Tables of spheres in text: one sphere a line, with or without a header.
+
+Cells are separated by commas, semicolons, tabs or blanks. The columns are found
+
+* by the names in a header, which may stand after other lines, or in a comment (numpy.savetxt);
+* by a comment ``#format x_y_z_r_matId``, as Yade's export.textExt writes it;
+* by their places, without a header: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
+  ``id x y z r`` (Voro++).
+
+Lines that start with # are comments; ``# box_lower = 0 0 0`` and ``# box_upper = 1 1 1`` give the box, and
+``##PERIODIC:: 1 1 1`` that of a periodic cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from porefv.errors import InputError
+from porefv.packing.files.column_names import Column, chosen_columns, roles, spheres
+from porefv.packing.files.content import FileContent, periodicity
+from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metadata, split, text_lines
+
+_DELIMITERS = (";", "\t", ",", None)
+_MOST_BEFORE = 100  # rows among which the header is looked for
+
+_HEADERLESS = (
+    'Give a header line such as x,y,z,radius, or the places of the columns, as in columns = { x = "1", y = "2", '
+    'z = "3", radius = "4" }.'
+)
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The names of the columns, and where the rows start."""
+
+    names: list[str]
+    line: int  # 0: there is none
+    skip: int
+    delimiter: str | None
+    format: str
+
+
+def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
+    """Read a table; errors name the file and the line."""
+    rows = Rows(path, text_lines(path, content))
+    if not rows.texts:
+        raise InputError(f"{path}: only comments. Give a header x,y,z,radius, then one sphere a line.")
+    chosen_frame(path, 1, options)
+    header = _header(path, rows, options)
+    cells = len(header.names)
+    if header.line:
+        columns = chosen_columns(path, header.line, header.names, options)
+        values, lines = _values(rows, columns, cells, header)
+    else:
+        header, columns, values, lines = _without_names(path, rows, header, options)
+    place = f"{path}, line {header.line}" if header.line else f"{path}"
+    centres, radii, unit, names = spheres(place, columns, values, options)
+    corners, metadata = read_metadata(path, rows.comments)
+    box_place = "comments box_lower, box_upper"
+    cell, said = _periodic_cell(path, rows, options)
+    if cell is not None:
+        corners, box_place = cell, "##PERIODIC::"
+    return FileContent(
+        header.format, centres, radii, corners, box_place, unit, lines, names, periodicity=said, metadata=metadata
+    )
+
+
+def _values(rows: Rows, columns: list[Column], cells: int, header: _Header) -> tuple[NDArray, NDArray]:
+    """(n, number of columns) numbers, and the lines."""
+    wanted = {f"{column.name}\0{column.position}": column.position for column in columns}
+    return rows.columns(wanted, cells, header.delimiter, header.skip)
+
+
+def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
+    for line, comment in rows.comments:
+        words = comment.split()
+        if len(words) == 2 and words[0] == "format":
+            return _yade_format(path, line, words[1], rows)
+    first = next((k for k, text in enumerate(rows.texts[:_MOST_BEFORE]) if _is_numbers(text)), None)
+    candidates = [(rows.numbers[k], text, k + 1) for k, text in enumerate(rows.texts[: first or _MOST_BEFORE])]
+    if first == 0:
+        candidates = []
+    comments = [(line, text, first or 0) for line, text in rows.comments[:_MOST_BEFORE] if first is not None]
+    best, most = None, 0
+    for line, text, skip in [*candidates, *comments]:
+        for delimiter in _DELIMITERS:
+            names = split(text, delimiter)
+            known = len(roles(names, options) & {"x", "y", "z"})
+            if known > most and not (known == 1 and len(names) < 3):
+                best, most = (line, text, skip, delimiter, names), known
+    if best is None and first == 0:
+        delimiter = _delimiter(rows.texts[0])
+        names = [str(k + 1) for k in range(len(split(rows.texts[0], delimiter)))]
+        return _Header(names, 0, 0, delimiter, "table without header")
+    if best is None:
+        line, text, skip = candidates[-1 if first else 0]
+        delimiter = next((mark for mark in _DELIMITERS if mark is None or mark in text), None)
+        best = (line, text, skip, delimiter, split(text, delimiter))
+    line, text, skip, delimiter, names = best
+    # A header in a comment may be separated in another way than the rows.
+    row = rows.texts[skip] if skip < len(rows.texts) else ""
+    if line in {number for number, *_ in comments} and len(split(row, delimiter)) != len(names):
+        delimiter = _delimiter(row)
+    kind = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}[delimiter]
+    return _Header([name.strip() for name in names], line, skip, delimiter, f"table with header, separated by {kind}")
+
+
+def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
+    names = text.split("_")
+    if not {"x", "y", "z", "r"} <= set(names):
+        raise InputError(f"{path}, line {line}: the format {quoted(text)} lacks one of x, y, z, r.")
+    if names[-1] == "attrs":
+        names += [""] * (len(rows.texts[0].split()) - len(names))
+    return _Header(names, line, 0, None, "Yade text (#format)")
+
+
+def _is_numbers(text: str) -> bool:
+    """Whether a line is a row of spheres: three numbers or more."""
+    cells = split(text, _delimiter(text))
+    return sum(map(_is_number, cells)) >= 3
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _delimiter(row: str) -> str | None:
+    """What separates the cells of a row of numbers."""
+    return max(_DELIMITERS, key=lambda mark: (sum(map(_is_number, split(row, mark))), mark is None))
+
+
+def _without_names(
+    path: AnyPath, rows: Rows, header: _Header, options: ReadOptions
+) -> tuple[_Header, list[Column], NDArray, NDArray]:
+    """Columns by their places, the format that these tell, and all values."""
+    cells, line = len(header.names), rows.numbers[0]
+    if options.columns:
+        columns = chosen_columns(path, line, header.names, options)
+        return header, columns, *_values(rows, columns, cells, header)
+    sized = options.radius is None
+    if cells not in (3 + sized, 5):
+        raise InputError(
+            f"{path}, line {line}: {cells} columns without names{'' if cells != 3 else ' and no radius'}. {_HEADERLESS}"
+        )
+    places = dict(zip(("x", "y", "z", "radius"), range(4), strict=True))
+    everything = {name: k for k, name in enumerate(("x", "y", "z", "radius", "column 5")[:cells])}
+    values, lines = rows.columns(everything, cells, header.delimiter)
+    numbered = _is_numbering(values[:, 0])
+    format = "table without header, x y z radius"
+    if cells == 4 and numbered and len(values) > 3 and np.ptp(values[:, 3]) > 0:
+        raise InputError(
+            f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read as x. {_HEADERLESS}"
+        )
+    if cells == 5:
+        whole = bool((values[:, 4] % 1 == 0).all())
+        if numbered == whole:
+            raise InputError(
+                f"{path}, line {line}: 5 columns without names are neither clearly id x y z radius (Voro++) nor "
+                f"x y z radius clump (SpherePack). {_HEADERLESS}"
+            )
+        format = "Voro++ text (id x y z radius)" if numbered else "SpherePack text (x y z radius clump)"
+        places = {role: place + numbered for role, place in places.items()}
+    if not sized:
+        places.pop("radius")
+        format = "table without header, x y z"
+    columns = [Column(role, place, str(place + 1)) for role, place in places.items()]
+    return (
+        _Header(header.names, 0, 0, header.delimiter, format),
+        columns,
+        values[:, list(places.values())],
+        lines,
+    )
+
+
+def _is_numbering(values: NDArray) -> bool:
+    """Whether values are n consecutive whole numbers, from 0 or 1, in any order."""
+    if not (np.isfinite(values).all() and values.min() in (0.0, 1.0)):
+        return False
+    return bool((np.sort(values) == np.arange(len(values)) + values.min()).all())
+
+
+def _periodic_cell(path: AnyPath, rows: Rows, options: ReadOptions) -> tuple[Corners | None, str]:
+    """Corners of the periodic cell of a SpherePack file, from the origin; and what is said of it."""
+    for line, comment in rows.comments:
+        if not comment.startswith("#PERIODIC::"):
+            continue
+        try:
+            size = np.array([float(word) for word in comment.removeprefix("#PERIODIC::").split()])
+        except ValueError:
+            size = np.empty(0)
+        if size.shape != (3,):
+            raise InputError(
+                f"{path}, line {line}: ##PERIODIC:: must be followed by three numbers, not {quoted(comment)}."
+            )
+        return (np.zeros(3), size), periodicity(f"{path}, line {line}", "xyz", "##PERIODIC::", options)
+    return None, ""
