@@ -149,7 +149,8 @@ class Packing:
         lower = (self.centres - self.radii[:, None]).min(axis=0)
         upper = (self.centres + self.radii[:, None]).max(axis=0)
         digit = 10.0 ** (np.floor(np.log10((upper - lower).max())) - 5)
-        return Box(np.floor(lower / digit) * digit, np.ceil(upper / digit) * digit)
+        # What rounding adds to a bound does not push it to the next digit.
+        return Box(np.floor(lower / digit + 1e-6) * digit, np.ceil(upper / digit - 1e-6) * digit)
 
     @property
     def reading(self) -> Reading | None:

@@ -66,7 +66,7 @@ class PackingFile(Table):
         shown="by the content, then by the extension",
     )
     columns: ColumnsTable | None = key(
-        'columns of the file, as in `{ x = "X", radius = "R" }`, with the keys `x`, `y`, `z`, and `radius` or `diameter`',
+        'columns of the file, as in `{ x = "X", radius = "R" }`, with the keys `x`, `y`, `z`, `radius` or `diameter`',
         None,
         shown="by their names",
     )
@@ -80,7 +80,8 @@ class PackingFile(Table):
     )
     frame: Integer | None = key("frame to read of a file with several: 0 is the first, -1 the last", None, shown="-1")
     periodic: Annotated[str, Choice(("ignore",))] | None = key(
-        '`"ignore"`: read a periodic packing into a box with six walls. Flow near these walls is not that of the bulk',
+        'with `"ignore"`, a periodic packing is read into a box with six walls. Flow near these walls is not that of '
+        "the bulk",
         None,
         shown="a periodic packing is an error",
     )
@@ -110,7 +111,7 @@ class PackingFile(Table):
                 ", ".join(repr(float(f"{c:.12g}")) for c in corner) for corner in (around.lower, around.upper)
             )
             raise InputError(
-                f"{scene or 'scene'}: {self.file} holds no box. Give one in the scene; that around the spheres is\n"
+                f"{scene or 'scene'}: {self.file} holds no box; give one in the scene, such as that of the spheres:\n"
                 f"[box]\nlower = [{lower}]\nupper = [{upper}]"
             )
         return packing

@@ -31,7 +31,7 @@ Velocities
 """
 
 
-def frame(step, radius, columns="id type x y z radius", bounds="pp ff mm"):
+def frame(step, radius, columns="id type x y z radius", bounds="ff fs mm"):
     return f"""ITEM: TIMESTEP
 {step}
 ITEM: NUMBER OF ATOMS
@@ -81,7 +81,7 @@ def test_a_data_file_without_box_or_hint_is_read(read):
         ("Atoms  # sphere", "Ellipsoids", ": not a LAMMPS data file"),
         ("0 2.5 ylo yhi", "0 two ylo yhi", ", line 7: '0 two' are not two numbers"),
         ("0 2.5 ylo yhi", "2 2 ylo yhi", ": the box has size 0 m along y"),
-        ("Masses", "0 0 0 xy xz yz", ", line 10: the box is tilted"),
+        ("Masses", "0 0.1 0 xy xz yz", ", line 10: the box is tilted"),
         ("0.7 0.8 0.9 0 0 0", "0.7 0.8", ", line 16: 6 cells where atom_style sphere has 7"),
         ("0.1 0.2 0.3 0 0 0", "0.1 0.2 0.3", ", line 17: 7 cells instead of 10"),
         ("2 1 0.2 2500", "2 1 big 2500", ", line 19: diameter is 'big', not a number"),
@@ -127,17 +127,22 @@ def test_a_dump_is_known_by_its_content_and_may_hold_units_and_time(read):
     ("content", "said"),
     [
         (frame(0, 0.1)[:-24], ", line 10: 2 atoms declared, 1 given. Was the file cut off?"),
-        (frame(0, 0.1) + frame(1, 0.1)[:41], ": the last frame lacks ITEM: BOX BOUNDS"),
-        (frame(0, 0.1) + "ITEM: TIMESTEP\n", ": the last frame lacks ITEM: NUMBER OF ATOMS"),
+        (frame(1, 0.1)[:41], ": the last frame lacks ITEM: BOX BOUNDS"),
+        ("ITEM: TIMESTEP\n", ": the last frame lacks ITEM: NUMBER OF ATOMS"),
         (frame(0, 0.1).replace("ATOMS\n2", "ATOMS\ntwo"), ", line 4: 'two' is not a number of atoms"),
         (frame(0, 0.1).replace("0 2\n", "0\n"), ", line 7: two numbers, lower and upper, are expected"),
         (frame(0, 0.1).replace("0 2\n", "2 0\n"), ": the box has size -2 m along y"),
-        (frame(0, 0.1, bounds="xy xz yz pp pp pp"), ", line 5: the box is tilted"),
-        (frame(0, 0.1, columns="id type x y z mass"), ", line 9: the columns 'id type x y z mass' lack"),
+        (frame(0, 0.1, bounds="xy xz yz pp pp pp"), ", line 6: three numbers, lower, upper and tilt"),
+        (frame(0, 0.1, bounds="abc origin pp pp pp"), ", line 5: the box is tilted"),
         (
-            frame(0, 0.1, columns="type mol x y z radius"),
-            ", line 9: the columns 'type mol x y z radius' lack",
+            frame(0, 0.1, bounds="xy xz yz ff ff ff")
+            .replace("0 4\n", "0 4 0\n")
+            .replace("-1 1\n", "-1 1 0.5\n")
+            .replace("0 2\n", "0 2 0\n"),
+            ", line 6: the box is tilted",
         ),
+        (frame(0, 0.1, bounds="ff pp mm"), ", line 5: the packing is periodic along y (BOX BOUNDS ff pp mm)"),
+        (frame(0, 0.1, columns="id type x y z mass"), ", line 9: the columns 'id type x y z mass' lack"),
         (frame(0, 0.1, columns="id x y z radius"), ", line 10: 6 cells instead of 5"),
         (frame(0, 0.1).replace("2 1 0.5", "nan 1 0.5"), ", line 10: atom id nan is not a whole number"),
         (frame(0, 0.1).replace("2 1 0.5", "1e99 1 0.5"), ", line 10: atom id 1e+99 is not a whole number"),

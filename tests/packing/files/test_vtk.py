@@ -75,8 +75,8 @@ def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, poin
             Packing.read(tmp_path / "a.vtp")
         return str(caught.value)
 
-    points.point_data["diameter"] = [0.1, 0.2]
-    assert "there are 2" in error()
+    points.point_data["diameter"] = [0.1, 0.4]
+    assert "the columns 'radius' and 'diameter' disagree" in error()
     del points.point_data["diameter"]
     points.point_data["radius"] = [0.1, -0.1]
     assert "sphere 1: radius -0.1" in error()
@@ -84,7 +84,7 @@ def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, poin
     assert "must have one component" in error()
     del points.point_data["radius"]
     points.point_data["mass"] = [1, 2]
-    assert "there are 0. Point data: 'mass'" in error()
+    assert "point data: 'mass', and there is no radius" in error()
     points.point_data["radius"] = [0.1, 0.1]
     points.field_data["box_upper"] = [1.0, 0.0, 1.0]
     assert "the box has size 0 m along y" in error()

@@ -1,4 +1,4 @@
-"""Which columns of a table hold x, y, z, radius and diameter, and in which unit: by the user's map, or by their names."""
+"""Which columns of a table hold x, y, z, radius and diameter, and their units: by the user's map, or by their names."""
 
 from __future__ import annotations
 
@@ -112,8 +112,9 @@ def chosen_columns(path: AnyPath, line: int, names: Sequence[str], options: Read
         missing_radius(place, f"the columns are {quoted(','.join(names))}, and ")
     if missing:
         raise InputError(
-            f"{place}: the header {quoted(','.join(names))} lacks {', '.join(missing)}. Name the columns "
-            'x, y, z and radius in the file, or map them: columns = { x = "...", y = "...", z = "...", radius = "..." }.'
+            f"{place}: the header {quoted(','.join(names))} lacks {', '.join(missing)}. Name the "
+            "columns x, y, z and radius in the file, or map them: "
+            'columns = { x = "...", y = "...", z = "...", radius = "..." }.'
         )
     return found
 
@@ -129,6 +130,15 @@ def _mapped(place: str, role: str, names: list[str], wanted: str) -> Column:
     known = recognised(names[places[0]])
     unit = known[1] if known else (match[2] if (match := _BRACKETS.fullmatch(names[places[0]])) else "")
     return Column(role, places[0], names[places[0]], unit)
+
+
+def positions(columns: Sequence[Column]) -> dict[str, int]:
+    """Position of each column by a name for errors: its role, or its own name if the role has several."""
+    found: dict[str, int] = {}
+    for column in columns:
+        name = column.role if column.role not in found else column.name
+        found[name if name not in found else f"{name} (column {column.position + 1})"] = column.position
+    return found
 
 
 def spheres(
@@ -169,8 +179,8 @@ def spheres(
         first, name = found[role]
         if not _agree(first, numbers):
             raise InputError(
-                f"{place}: the columns {quoted(name.removesuffix(' (halved)'))} and {quoted(column.name)} disagree about "
-                f'{role}. Say which to read, as in columns = {{ {column.role} = "{column.name}" }}.'
+                f"{place}: the columns {quoted(name.removesuffix(' (halved)'))} and {quoted(column.name)} disagree "
+                f'about {role}. Say which to read, as in columns = {{ {column.role} = "{column.name}" }}.'
             )
     centres = np.column_stack([found[axis][0] for axis in "xyz"])
     radii = found["radius"][0] if "radius" in found else None

@@ -122,8 +122,8 @@ class FileContent:
 def missing_radius(place: str | AnyPath, found: str = "") -> NoReturn:
     """Refuse a file without radii; `found` says what it has instead, and ends in "and "."""
     raise InputError(
-        f'{place}: {found}there is no radius or diameter. Name its column, as in columns = {{ radius = "..." }}, or give '
-        "one radius of all spheres as radius, in m."
+        f'{place}: {found}there is no radius or diameter. Name its column, as in columns = {{ radius = "..." }}, or '
+        "give one radius of all spheres as radius, in m."
     )
 
 

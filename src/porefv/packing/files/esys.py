@@ -36,8 +36,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     number = rows.texts[1].strip()
     if not _COUNT.fullmatch(number) or int(number) != end - 2 or end == 2:
         raise InputError(
-            f"{path}, line {rows.numbers[1]}: {quoted(number)} particles declared, {max(end - 2, 0)} given before EndParticles. "
-            "Was the file cut off?"
+            f"{path}, line {rows.numbers[1]}: {quoted(number)} particles declared, {max(end - 2, 0)} given before "
+            "EndParticles. Was the file cut off?"
         )
     del rows.texts[end:], rows.numbers[end:]
     values, numbers = rows.columns({"x": 0, "y": 1, "z": 2, "radius": 3}, 6, skip=2)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import Column, chosen_columns, recognised, spheres
+from porefv.packing.files.column_names import Column, chosen_columns, positions, recognised, spheres
 from porefv.packing.files.content import FileContent, LengthUnit, periodicity
 from porefv.packing.files.frames import chosen_frame, warn_cut_off
 from porefv.packing.files.options import ReadOptions
@@ -139,7 +139,7 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     _check_number(path, _declared(path, lines, frame), len(rows.texts), rows.numbers[-1] if rows.numbers else start + 1)
     names = lines[start].split()[2:]
     columns, scaled = _dump_columns(path, start + 1, names, options)
-    wanted = {column.name: column.position for column in columns}
+    wanted = positions(columns)
     if "id" in names:
         wanted["atom id"] = names.index("id")
     values, numbers = rows.columns(wanted, len(names))

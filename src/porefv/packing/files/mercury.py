@@ -50,7 +50,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
 
 def _frames(path: AnyPath, rows: Rows, whole_lines: bool) -> tuple[list[int], list[int], tuple[str, ...]]:
     """Row of the header of each whole frame, number of its spheres, and what is to be noted."""
-    starts, sizes = [], []
+    starts: list[int] = []
+    sizes: list[int] = []
     row, total = 0, len(rows.texts)
     while row < total:
         words = rows.texts[row].split()
@@ -68,7 +69,8 @@ def _frames(path: AnyPath, rows: Rows, whole_lines: bool) -> tuple[list[int], li
             return starts, sizes, (warn_cut_off(f"{path}, line {rows.numbers[-1]}", len(starts)),)
         if after > total:
             raise InputError(
-                f"{path}, line {rows.numbers[-1]}: {size} spheres declared, {total - row - 1} given. Was the file cut off?"
+                f"{path}, line {rows.numbers[-1]}: {size} spheres declared, {total - row - 1} given. "
+                "Was the file cut off?"
             )
         starts.append(row)
         sizes.append(size)

@@ -1,4 +1,4 @@
-"""ParaView's list of frames (.pvd), as `porefv.export.Trajectory` writes ``grains.pvd``: the VTK file of a frame is read."""
+"""ParaView's list of frames (.pvd), such as the ``grains.pvd`` of `porefv.export.Trajectory`: one frame is read."""
 
 from __future__ import annotations
 

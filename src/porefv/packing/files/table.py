@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import Column, chosen_columns, roles, spheres
+from porefv.packing.files.column_names import Column, chosen_columns, positions, roles, spheres
 from porefv.packing.files.content import FileContent, periodicity
 from porefv.packing.files.frames import chosen_frame
 from porefv.packing.files.options import ReadOptions
@@ -72,8 +72,7 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
 
 def _values(rows: Rows, columns: list[Column], cells: int, header: _Header) -> tuple[NDArray, NDArray]:
     """(n, number of columns) numbers, and the lines."""
-    wanted = {f"{column.name}\0{column.position}": column.position for column in columns}
-    return rows.columns(wanted, cells, header.delimiter, header.skip)
+    return rows.columns(positions(columns), cells, header.delimiter, header.skip)
 
 
 def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
@@ -158,7 +157,8 @@ def _without_names(
     format = "table without header, x y z radius"
     if cells == 4 and numbered and len(values) > 3 and np.ptp(values[:, 3]) > 0:
         raise InputError(
-            f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read as x. {_HEADERLESS}"
+            f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read "
+            f"as x. {_HEADERLESS}"
         )
     if cells == 5:
         whole = bool((values[:, 4] % 1 == 0).all())

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import Column, chosen_columns, spheres
-from porefv.packing.files.content import FileContent
+from porefv.packing.files.column_names import Column, chosen_columns, roles, spheres
+from porefv.packing.files.content import FileContent, missing_radius
 from porefv.packing.files.frames import chosen_frame
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, quoted
@@ -48,13 +48,11 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         raise InputError(f"{path}: the points of a VTK file are the centres. Map radius or diameter only.")
     mesh = _read_mesh(path, content)
     arrays = list(mesh.point_data)
-    chosen = [
-        column
-        for column in chosen_columns(path, 0, ["x", "y", "z", *arrays], options)
-        if column.role not in "xyz" and column.position > 2
-    ]
+    if options.radius is None and not roles(arrays, options) & {"radius", "diameter"}:
+        missing_radius(path, f"point data: {', '.join(map(quoted, arrays)) or 'none'}, and ")
+    sizes = chosen_columns(path, 0, ["x", "y", "z", *arrays], options)[3:]
     columns, values = [Column(axis, k, axis) for k, axis in enumerate("xyz")], [mesh.points]
-    for column in chosen:
+    for column in sizes:
         found = np.asarray(mesh.point_data[arrays[column.position - 3]])
         if found.ndim != 1:
             raise InputError(f"{path}: point data {quoted(column.name)} must have one component a point.")

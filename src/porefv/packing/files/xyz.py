@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import chosen_columns, spheres
+from porefv.packing.files.column_names import chosen_columns, positions, spheres
 from porefv.packing.files.content import FileContent, periodicity
 from porefv.packing.files.frames import chosen_frame, warn_cut_off
 from porefv.packing.files.options import ReadOptions
@@ -36,8 +36,7 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         raise InputError(
             f"{path}, line {start + 1}: {size} spheres declared, and a line among them is blank or a comment."
         )
-    wanted = {f"{column.name}\0{column.position}": column.position for column in columns}
-    values, numbers = rows.columns(wanted, len(names))
+    values, numbers = rows.columns(positions(columns), len(names))
     centres, radii, unit, shown = spheres(place, columns, values, options)
     axes = "".join(axis for axis, flag in zip("xyz", keys.get("pbc", "").split(), strict=False) if flag[0] in "T1t")
     return FileContent(

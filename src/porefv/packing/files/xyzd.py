@@ -28,6 +28,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         raise InputError(f"{path}: an .xyzd file has columns of its own. Drop columns and radius.")
     if len(content) % _BYTES:
         raise InputError(f"{path}: {len(content)} bytes are no multiple of the {_BYTES} of a sphere. Was it cut off?")
+    if content.isascii():  # as no file of doubles is
+        raise InputError(f"{path}: text, and an .xyzd file holds binary numbers. Give the format of the file.")
     values = np.frombuffer(content, "<f8").reshape(-1, 4)
     nfo = (
         Path(path).with_suffix("").with_suffix(".nfo") if str(path).endswith(".gz") else Path(path).with_suffix(".nfo")
