@@ -27,7 +27,7 @@ _AXIS = re.compile(rf"{_OWNERS}(?:{_PLACES}?([xyz])|([xyz]){_PLACES})")
 _COMPONENT = re.compile(rf"{_OWNERS}{_PLACES}([012])")
 _SIZE = re.compile(rf"{_OWNERS}(?:equivalent|equiv|eq)?(?:(r|rad|radius|radii)|(d|diam|diameter|diameters)){_OWNERS}")
 _BRACKETS = re.compile(r"(.*?)[\s,_/]*[\(\[]\s*([^\)\]]*?)\s*[\)\]]")
-_SUFFIX = re.compile(rf"(.+?)[\s_]({'|'.join(UNITS)})")
+_SUFFIX = re.compile(rf"(.+?)(?:[\s_]|\s*/\s*)({'|'.join(UNITS)})")
 
 # Two columns for the same thing may differ by so much of it: digits lost when they were written.
 _ROUNDING = 1e-4

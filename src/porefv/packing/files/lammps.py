@@ -161,10 +161,14 @@ def _frames(path: AnyPath, lines: list[str]) -> list[_Frame]:
     frames: list[_Frame] = []
     items: dict[str, int] = {}
     unit = None
-    for position in [k for k, line in enumerate(lines) if line.startswith("ITEM:")]:
+    last = len(lines) - 1
+    cut = bool(lines[last]) and ("ITEM:".startswith(lines[last]) or lines[last].startswith("ITEM:"))
+    for position in [k for k, line in enumerate(lines) if line.startswith("ITEM:") or (cut and k == last)]:
         line = lines[position]
         name = next((item for item in _ITEMS if item in line), line.removeprefix("ITEM:").strip())
-        if name in items or ("ATOMS" in items and name in ("UNITS", "TIME", "TIMESTEP")):
+        if name in items or (
+            "ATOMS" in items and (name in ("UNITS", "TIME", "TIMESTEP") or (cut and position == last))
+        ):
             frames.append(_Frame(items, position, unit))
             items = {}
         if name == "UNITS":

@@ -28,6 +28,9 @@ from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metad
 _DELIMITERS = (";", "\t", ",", None)
 _MOST_BEFORE = 100  # rows among which the header is looked for
 
+_PERIODIC = "#PERIODIC::"  # after the # of a comment
+_SPHERE_PACK = "SpherePack text (x y z radius clump)"
+
 _HEADERLESS = (
     'Give a header line such as x,y,z,radius, or the places of the columns, as in columns = { x = "1", y = "2", '
     'z = "3", radius = "4" }.'
@@ -160,14 +163,16 @@ def _without_names(
             f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read "
             f"as x. {_HEADERLESS}"
         )
-    if cells == 5:
+    if cells == 5 and any(comment.startswith(_PERIODIC) for _, comment in rows.comments):
+        format = _SPHERE_PACK
+    elif cells == 5:
         whole = bool((values[:, 4] % 1 == 0).all())
         if numbered == whole:
             raise InputError(
                 f"{path}, line {line}: 5 columns without names are neither clearly id x y z radius (Voro++) nor "
                 f"x y z radius clump (SpherePack). {_HEADERLESS}"
             )
-        format = "Voro++ text (id x y z radius)" if numbered else "SpherePack text (x y z radius clump)"
+        format = "Voro++ text (id x y z radius)" if numbered else _SPHERE_PACK
         places = {role: place + numbered for role, place in places.items()}
     if not sized:
         places.pop("radius")
@@ -191,10 +196,10 @@ def _is_numbering(values: NDArray) -> bool:
 def _periodic_cell(path: AnyPath, rows: Rows, options: ReadOptions) -> tuple[Corners | None, str]:
     """Corners of the periodic cell of a SpherePack file, from the origin; and what is said of it."""
     for line, comment in rows.comments:
-        if not comment.startswith("#PERIODIC::"):
+        if not comment.startswith(_PERIODIC):
             continue
         try:
-            size = np.array([float(word) for word in comment.removeprefix("#PERIODIC::").split()])
+            size = np.array([float(word) for word in comment.removeprefix(_PERIODIC).split()])
         except ValueError:
             size = np.empty(0)
         if size.shape != (3,):

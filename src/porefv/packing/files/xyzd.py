@@ -47,7 +47,10 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
 
 def _nfo(path: AnyPath, nfo: Path, spheres: int) -> tuple[Corners | None, float]:
     """Corners of the box, from the origin, and the factor from the diameters in the file to those of the packing."""
-    lines = text_lines(nfo, read_bytes(nfo))
+    try:
+        lines = text_lines(nfo, read_bytes(nfo))
+    except InputError as error:
+        raise InputError(f"{path}: the file beside it cannot be read: {error}") from None
     found = {
         match[1].lower(): (line, match[2].strip())
         for line, text in enumerate(lines, 1)
