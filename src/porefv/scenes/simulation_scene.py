@@ -16,6 +16,7 @@ from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.flow.fluid import Fluid
 from porefv.packing.box import Box
+from porefv.packing.packing import Packing
 from porefv.scenes.errors import refused
 from porefv.scenes.material_table import MaterialTable
 from porefv.scenes.shared_tables import BoxFromOriginTable, ConductanceTable, FluidTable, PackingFile, PathOrTable
@@ -192,7 +193,10 @@ class SimulationScene(Scene):
         """Interval between checkpoints."""
         return self.checkpoint
 
+    def read_packing(self) -> Packing:
+        """The packing, in the scene's box or its own."""
+        return self.packing.read(self.path, self.box)
+
     def grains(self) -> DEM:
         """The grains at the start, between walls that stand."""
-        packing = self.packing.read(self.path, self.box)
-        return DEM(packing, self.material, gravity=self.gravity, step=self.step)
+        return DEM(self.read_packing(), self.material, gravity=self.gravity, step=self.step)
