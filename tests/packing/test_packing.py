@@ -331,4 +331,4 @@ def test_bounding_box_holds_every_sphere_with_few_digits():
         assert (packing.radii[:, None] - box.wall_distances(packing.centres)).max() <= 1e-9 * scale
         extent = (packing.centres + packing.radii[:, None]).max(axis=0)
         np.testing.assert_allclose(box.upper, extent, atol=2e-5 * scale)
-    np.testing.assert_array_equal(Packing([[0.5, 0.5, 0.5]], [0.4]).bounding_box.upper, 0.9)
+    np.testing.assert_allclose(Packing([[0.5, 0.5, 0.5]], [0.4]).bounding_box.upper, 0.9, rtol=1e-15)

@@ -101,7 +101,7 @@ def test_a_bad_box_is_refused(error, comments, said):
     ("content", "said"),
     [
         ("a,b,c,w\n1,2,3,4\n", ", line 1: the header 'a,b,c,w' lacks x, y, z, radius (or diameter)."),
-        ("# x,y,z,r\n1,2,3,4,5\n", ", line 2: 5 cells instead of 4"),
+        ("# x,y,z,r\n1,2,3,4,5\n", ", line 2: 5 columns without names"),
         ("x,y,radius\n1,2,4\n", ", line 1: the header 'x,y,radius' lacks z"),
         ("x,y,z,radius,r\n1,2,3,4,5\n", ", line 1: the columns 'radius' and 'r' disagree about radius"),
         ("x,y,z,w\n1,2,3,4\n", ", line 1: the columns are 'x,y,z,w', and there is no radius or diameter"),

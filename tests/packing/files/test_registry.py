@@ -101,6 +101,7 @@ VALID = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::porefv.errors.PackingFileWarning")
 @pytest.mark.parametrize("format", VALID)
 def test_a_damaged_file_gives_a_packing_or_an_error_that_names_it(tmp_path, format):
     path, valid = tmp_path / "damaged", VALID[format]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from porefv.errors import InputError
+from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.packing import Packing
 
 
@@ -86,6 +86,32 @@ def test_lines_before_the_header_and_a_header_in_a_comment(read):
         np.testing.assert_array_equal(read(content).centres, [[1, 2, 3], [5, 6, 7]])
 
 
+def test_a_comment_that_is_no_header_is_left_alone(read):
+    for comment in ("# columns: x y z r of 2 grains", "# x y z", "# grains of x"):
+        np.testing.assert_array_equal(read(f"{comment}\n1 2 3 4\n5 6 7 8\n").radii, [4, 8])
+
+
+def test_units_in_comments_and_beside_names_are_converted(read):
+    for content in (
+        "# units = mm\n1 2 3 4\n",
+        "# Length unit: mm\nx,y,z,r\n1,2,3,4\n",
+        "# x [mm] y [mm] z [mm] r [mm]\n1 2 3 4\n",
+        "x (mm) y (mm) z (mm) r (mm)\n1 2 3 4\n",
+    ):
+        assert read(content).radii[0] == 0.004
+    for content, said in (
+        ("# x y z r [mm]\n1 2 3 4\n", "'r [mm]' states a unit, and 'x' states none"),
+        (
+            "# units = mm\nx (m),y (m),z (m),r (m)\n1,2,3,4\n",
+            "line 1: the unit is 'mm', and the names of columns state",
+        ),
+        ("# units = furlong\n1 2 3 4\n", "line 1: lengths are in 'furlong'"),
+    ):
+        with pytest.raises(InputError) as caught:
+            read(content)
+        assert said in str(caught.value)
+
+
 def test_columns_are_mapped_by_name_or_by_place(read):
     content = "a,b,c,size\n1,2,3,4\n5,6,7,8\n"
     columns = {"x": "c", "y": "B", "z": "a", "diameter": "size"}
@@ -133,7 +159,11 @@ def test_columns_that_agree_are_read_and_others_refused_with_the_remedy(read):
 def test_a_radius_for_all_needs_a_file_without_radii(read):
     np.testing.assert_array_equal(read("1 2 3\n4 5 6\n", "a.txt", radius=0.5).radii, 0.5)
     np.testing.assert_array_equal(read("x,y,z\n1,2,3\n", radius=0.5, scale=2.0).centres, [[2, 4, 6]])
-    np.testing.assert_array_equal(read("x,y,z,r\n1,2,3,4\n", radius=0.5).radii, 0.5)
+    for rows in ("x,y,z,r\n1,2,3,4\n", "1.5 2 3 4 -1\n"):
+        with pytest.warns(PackingFileWarning, match="the radius given is used instead of"):
+            np.testing.assert_array_equal(read(rows, radius=0.5).radii, 0.5)
+    with pytest.raises(InputError, match="line 1: 4 columns without names"):
+        read("1 2 3 4\n", radius=0.5)
 
 
 @pytest.mark.parametrize(

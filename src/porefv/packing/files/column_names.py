@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.files.content import LengthUnit, missing_radius
+from porefv.packing.files.content import LengthUnit, missing_radius, warn_radius
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, quoted
 
@@ -104,6 +104,8 @@ def chosen_columns(path: AnyPath, line: int, names: Sequence[str], options: Read
                 for position, name in enumerate(names)
                 if (known := recognised(name)) and known[0] == role
             ]
+    if options.radius is not None and (sizes := roles(names, options) & {"radius", "diameter"}):
+        warn_radius(place, f"the column of {' and '.join(sorted(sizes))}")
     given = {column.role for column in found}
     missing = [role for role in ("x", "y", "z") if role not in given]
     if options.radius is None and not given & {"radius", "diameter"}:

@@ -119,6 +119,11 @@ class FileContent:
         return np.full(len(self.centres), options.radius)
 
 
+def warn_radius(place: str | AnyPath, name: str) -> None:
+    """Warn that the radii of a file are not read, since the user gives one radius of all spheres."""
+    warnings.warn(f"{place}: the radius given is used instead of {name}.", PackingFileWarning, stacklevel=2)
+
+
 def missing_radius(place: str | AnyPath, found: str = "") -> NoReturn:
     """Refuse a file without radii; `found` says what it has instead, and ends in "and "."""
     raise InputError(

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.files.content import FileContent
+from porefv.packing.files.content import FileContent, warn_radius
 from porefv.packing.files.frames import chosen_frame, warn_cut_off
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Rows, quoted, text_lines
@@ -40,6 +40,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     if cells < 7 or options.columns:
         what = "fewer than 7 cells: x y z vx vy vz radius" if cells < 7 else "columns of its own. Drop columns"
         raise InputError(f"{path}, line {line + 1}: a MercuryDPM file of three dimensions has {what}.")
+    if options.radius is not None:
+        warn_radius(path, "the radii of the file")
     columns = {"x": 0, "y": 1, "z": 2} | ({"radius": 6} if options.radius is None else {})
     values, numbers = rows.columns(columns, cells, skip=start + 1)
     return FileContent(

@@ -13,14 +13,16 @@ Lines that start with # are comments; ``# box_lower = 0 0 0`` and ``# box_upper 
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import Column, chosen_columns, positions, roles, spheres
-from porefv.packing.files.content import FileContent, periodicity
+from porefv.packing.files.column_names import UNITS, Column, chosen_columns, positions, roles, spheres
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity, warn_radius
 from porefv.packing.files.frames import chosen_frame
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metadata, split, text_lines
@@ -63,13 +65,28 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         header, columns, values, lines = _without_names(path, rows, header, options)
     place = f"{path}, line {header.line}" if header.line else f"{path}"
     centres, radii, unit, names = spheres(place, columns, values, options)
+    stated = _unit_in_comments(path, rows)
+    if unit and stated and unit.metres != stated.metres and options.scale is None:
+        raise InputError(
+            f"{stated.place}: the unit is {quoted(stated.name)}, and the names of columns state {quoted(unit.name)}. "
+            "Give the length of the unit in m as scale."
+        )
     corners, metadata = read_metadata(path, rows.comments)
     box_place = "comments box_lower, box_upper"
     cell, said = _periodic_cell(path, rows, options)
     if cell is not None:
         corners, box_place = cell, "##PERIODIC::"
     return FileContent(
-        header.format, centres, radii, corners, box_place, unit, lines, names, periodicity=said, metadata=metadata
+        header.format,
+        centres,
+        radii,
+        corners,
+        box_place,
+        unit or stated,
+        lines,
+        names,
+        periodicity=said,
+        metadata=metadata,
     )
 
 
@@ -84,32 +101,46 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
         if len(words) == 2 and words[0] == "format":
             return _yade_format(path, line, words[1], rows)
     first = next((k for k, text in enumerate(rows.texts[:_MOST_BEFORE]) if _is_numbers(text)), None)
-    candidates = [(rows.numbers[k], text, k + 1) for k, text in enumerate(rows.texts[: first or _MOST_BEFORE])]
+    delimiter = _delimiter(rows.texts[first]) if first is not None else None
+    cells = len(split(rows.texts[first], delimiter)) if first is not None else 0
+    before = rows.texts[: _MOST_BEFORE if first is None else first]
+    found = [
+        _Header(names, rows.numbers[k], k + 1, mark, _with_header(mark))
+        for k, text in enumerate(before)
+        for mark, names in _cells_of_header(text)
+    ]
+    # A header in a comment may be separated in another way than the rows. Other comments have other numbers of words.
+    found += [
+        _Header(names, line, first or 0, delimiter, _with_header(delimiter))
+        for line, text in rows.comments[:_MOST_BEFORE]
+        for _, names in _cells_of_header(text)
+        if len(names) == cells
+    ]
+    known = [len(roles(header.names, options) & {"x", "y", "z"}) for header in found]
+    known = [
+        0 if number == 1 and len(header.names) < 3 else number for number, header in zip(known, found, strict=True)
+    ]
+    if any(known):
+        return found[known.index(max(known))]
     if first == 0:
-        candidates = []
-    comments = [(line, text, first or 0) for line, text in rows.comments[:_MOST_BEFORE] if first is not None]
-    best, most = None, 0
-    for line, text, skip in [*candidates, *comments]:
-        for delimiter in _DELIMITERS:
-            names = split(text, delimiter)
-            known = len(roles(names, options) & {"x", "y", "z"})
-            if known > most and not (known == 1 and len(names) < 3):
-                best, most = (line, text, skip, delimiter, names), known
-    if best is None and first == 0:
-        delimiter = _delimiter(rows.texts[0])
-        names = [str(k + 1) for k in range(len(split(rows.texts[0], delimiter)))]
-        return _Header(names, 0, 0, delimiter, "table without header")
-    if best is None:
-        line, text, skip = candidates[-1 if first else 0]
-        delimiter = next((mark for mark in _DELIMITERS if mark is None or mark in text), None)
-        best = (line, text, skip, delimiter, split(text, delimiter))
-    line, text, skip, delimiter, names = best
-    # A header in a comment may be separated in another way than the rows.
-    row = rows.texts[skip] if skip < len(rows.texts) else ""
-    if line in {number for number, *_ in comments} and len(split(row, delimiter)) != len(names):
-        delimiter = _delimiter(row)
+        return _Header([str(k + 1) for k in range(cells)], 0, 0, delimiter, "table without header")
+    last = len(before) - 1 if first else 0
+    mark, names = next((mark, names) for mark, names in _cells_of_header(before[last]))
+    return _Header(names, rows.numbers[last], last + 1, mark, _with_header(mark))
+
+
+def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
+    """The names in a line, for each delimiter that the line has; units in brackets belong to the name before them."""
+    for mark in _DELIMITERS:
+        if mark is None:
+            yield mark, re.findall(r"\S+(?:\s+[\[(][^\s\])]*[\])])?", text)
+        elif mark in text:
+            yield mark, [name.strip() for name in split(text, mark)]
+
+
+def _with_header(delimiter: str | None) -> str:
     kind = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}[delimiter]
-    return _Header([name.strip() for name in names], line, skip, delimiter, f"table with header, separated by {kind}")
+    return f"table with header, separated by {kind}"
 
 
 def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
@@ -119,6 +150,14 @@ def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
     if names[-1] == "attrs":
         names += [""] * (len(rows.texts[0].split()) - len(names))
     return _Header(names, line, 0, None, "Yade text (#format)")
+
+
+def _unit_in_comments(path: AnyPath, rows: Rows) -> LengthUnit | None:
+    """The unit of lengths that a comment like ``# units = mm`` states."""
+    for line, comment in rows.comments:
+        if match := re.fullmatch(r"(?:length[ _]?)?units?\s*[:=]\s*(\S{1,40})", comment, re.IGNORECASE):
+            return LengthUnit(match[1], UNITS.get(match[1].lower()), f"{path}, line {line}")
+    return None
 
 
 def _is_numbers(text: str) -> bool:
@@ -175,8 +214,10 @@ def _without_names(
         format = "Voro++ text (id x y z radius)" if numbered else _SPHERE_PACK
         places = {role: place + numbered for role, place in places.items()}
     if not sized:
-        places.pop("radius")
-        format = "table without header, x y z"
+        if cells == 5:
+            warn_radius(path, f"place {places['radius'] + 1}")
+        del places["radius"]
+        format = "table without header, x y z" if cells == 3 else format
     columns = [Column(role, place, str(place + 1)) for role, place in places.items()]
     return (
         _Header(header.names, 0, 0, header.delimiter, format),
