@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from porefv.errors import InputError
 from porefv.packing.files.content import LengthUnit, missing_radius, warn_radius
-from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.options import ROLES, ReadOptions
 from porefv.packing.files.text import AnyPath, quoted
 
 # Metres in units of length that column names state.
@@ -83,8 +83,21 @@ def roles(names: Iterable[str], options: ReadOptions) -> set[str]:
     return found | {role for role, name in options.columns.items() if name in names}
 
 
-def chosen_columns(path: AnyPath, line: int, names: Sequence[str], options: ReadOptions) -> list[Column]:
+def chosen_columns(
+    path: AnyPath, line: int, names: Sequence[str], options: ReadOptions, wanted: Sequence[str] = ROLES
+) -> list[Column]:
     """The columns to read, in the order x, y, z, radius, diameter; of each one or more, which must then agree.
+
+    Parameters
+    ----------
+    path : path
+    line : int
+        Of the header; 0 if there is none.
+    names : sequence of str
+        Of all columns.
+    options : ReadOptions
+    wanted : sequence of str
+        Which of x, y, z, radius and diameter the columns have to give.
 
     Raises
     ------
@@ -95,7 +108,7 @@ def chosen_columns(path: AnyPath, line: int, names: Sequence[str], options: Read
     names = [name.strip().strip("\"'").strip() for name in names]
     found: list[Column] = []
     sized = any(role in options.columns for role in ("radius", "diameter"))
-    for role in ("x", "y", "z", "radius", "diameter"):
+    for role in wanted:
         if role in options.columns:
             found.append(_mapped(place, role, names, options.columns[role]))
         elif role in ("x", "y", "z") or not (sized or options.radius is not None):
@@ -107,7 +120,7 @@ def chosen_columns(path: AnyPath, line: int, names: Sequence[str], options: Read
     if options.radius is not None and (sizes := roles(names, options) & {"radius", "diameter"}):
         warn_radius(place, f"the column of {' and '.join(sorted(sizes))}")
     given = {column.role for column in found}
-    missing = [role for role in ("x", "y", "z") if role not in given]
+    missing = [role for role in ("x", "y", "z") if role in wanted and role not in given]
     if options.radius is None and not given & {"radius", "diameter"}:
         missing.append("radius (or diameter)")
     if missing == ["radius (or diameter)"]:

@@ -11,6 +11,8 @@ from porefv.packing.files.text import AnyPath
 
 def chosen_frame(path: AnyPath, frames: int, options: ReadOptions) -> int:
     """The position of the frame to read among those of a file, counted from 0."""
+    if frames == 0:
+        raise InputError(f"{path}: the file has no frame.")
     if options.frame is None:
         return frames - 1
     if not -frames <= options.frame < frames:

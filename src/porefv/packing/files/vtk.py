@@ -50,10 +50,9 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     arrays = list(mesh.point_data)
     if options.radius is None and not roles(arrays, options) & {"radius", "diameter"}:
         missing_radius(path, f"point data: {', '.join(map(quoted, arrays)) or 'none'}, and ")
-    sizes = chosen_columns(path, 0, ["x", "y", "z", *arrays], options)[3:]
     columns, values = [Column(axis, k, axis) for k, axis in enumerate("xyz")], [mesh.points]
-    for column in sizes:
-        found = np.asarray(mesh.point_data[arrays[column.position - 3]])
+    for column in chosen_columns(path, 0, arrays, options, wanted=("radius", "diameter")):
+        found = np.asarray(mesh.point_data[arrays[column.position]])
         if found.ndim != 1:
             raise InputError(f"{path}: point data {quoted(column.name)} must have one component a point.")
         columns.append(column)
