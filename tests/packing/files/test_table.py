@@ -34,6 +34,8 @@ def read(tmp_path):
         "x / m,y / m,z / m,r / m",
         "x-coordinate,y-coordinate,z-coordinate,radius",
         "cx,cy,cz,r",
+        "BaryCenterX,BaryCenterY,BaryCenterZ,EqRadius",
+        "Q01 : Particle Position X (m),Q02 : Particle Position Y (m),Q03 : Particle Position Z (m),Q04 : Radius (m)",
         "'x','y','z','radius'",
     ],
 )
@@ -81,9 +83,22 @@ def test_lines_before_the_header_and_a_header_in_a_comment(read):
         "Title of an export\nTIME:,0.5,s\n\nID,X,Y,Z,R\n1,1,2,3,4\n2,5,6,7,8\n",
         "# ID,X,Y,Z,R\n1,1,2,3,4\n2,5,6,7,8\n",
         "# ID X Y Z R\n1,1,2,3,4\n2,5,6,7,8\n",
+        "% ID X Y Z R\n1 1 2 3 4\n2 5 6 7 8\n",
         "# made by hand\n# ID X Y Z R\n1 1 2 3 4\n2 5 6 7 8\n",
     ):
         np.testing.assert_array_equal(read(content).centres, [[1, 2, 3], [5, 6, 7]])
+
+
+def test_a_number_of_spheres_before_them_is_compared(read):
+    assert len(read("2\n1 2 3 4\n5 6 7 8\n", "a.txt")) == 2
+    with pytest.raises(InputError, match="line 1: 3 spheres declared, 2 given"):
+        read("3\n1 2 3 4\n5 6 7 8\n", "a.txt")
+
+
+def test_indices_of_an_image_are_no_coordinates(read):
+    # scikit-image counts axes in the order of the array, which is that of the image reversed.
+    with pytest.raises(InputError, match="lacks x, y, z"):
+        read("label,centroid-0,centroid-1,centroid-2,equivalent_diameter\n1,1,2,3,4\n")
 
 
 def test_a_comment_that_is_no_header_is_left_alone(read):

@@ -22,10 +22,12 @@ UNITS = {
 
 # The words of a name are joined, in lower case, and these are left out before and after the axis or the size.
 _OWNERS = r"(?:particle|sphere|grain|bead|atom)?"
-_PLACES = r"(?:position|positions|pos|point|points|coord|coords|coordinate|coordinates|centre|center|centroid|c)"
+_POINTS = r"(?:position|positions|pos|point|points|coord|coords|coordinate|coordinates)"
+_PLACES = rf"(?:{_POINTS}|centre|center|centroid|barycentre|barycenter|c)"
 _AXIS = re.compile(rf"{_OWNERS}(?:{_PLACES}?([xyz])|([xyz]){_PLACES})")
-_COMPONENT = re.compile(rf"{_OWNERS}{_PLACES}([012])")
+_COMPONENT = re.compile(rf"{_OWNERS}{_POINTS}([012])")
 _SIZE = re.compile(rf"{_OWNERS}(?:equivalent|equiv|eq)?(?:(r|rad|radius|radii)|(d|diam|diameter|diameters)){_OWNERS}")
+_QUERY = re.compile(r"^Q\d+ ?: ?")  # of an EDEM export
 _BRACKETS = re.compile(r"(.*?)[\s,_/]*[\(\[]\s*([^\)\]]*?)\s*[\)\]]")
 _SUFFIX = re.compile(rf"(.+?)(?:[\s_]|\s*/\s*)({'|'.join(UNITS)})")
 
@@ -58,7 +60,7 @@ def recognised(name: str) -> tuple[str, str] | None:
     >>> recognised("Position X (mm)"), recognised("Points:2"), recognised("Radius"), recognised("vx")
     (('x', 'mm'), ('z', ''), ('radius', ''), None)
     """
-    name, unit = name.strip().strip("\"'").strip(), ""
+    name, unit = _QUERY.sub("", name.strip().strip("\"'").strip()), ""
     if len(name) > 60:
         return None
     if match := _BRACKETS.fullmatch(name):

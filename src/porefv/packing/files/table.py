@@ -4,7 +4,7 @@ Cells are separated by commas, semicolons, tabs or blanks. The columns are found
 
 * by the names in a header, which may stand after other lines, or in a comment (numpy.savetxt);
 * by a comment ``#format x_y_z_r_matId``, as Yade's export.textExt writes it;
-* by their places, without a header: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
+* by their places, without a header, after the number of spheres or not: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
   ``id x y z r`` (Voro++).
 
 Lines that start with # are comments; ``# box_lower = 0 0 0`` and ``# box_upper = 1 1 1`` give the box, and
@@ -121,9 +121,12 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
         0 if number == 1 and len(header.names) < 3 else number for number, header in zip(known, found, strict=True)
     ]
     if any(known):
-        return found[known.index(max(known))]
-    if first == 0:
-        return _Header([str(k + 1) for k in range(cells)], 0, 0, delimiter, "table without header")
+        # Of several ways to split a header, the one that splits the rows into as many cells comes first.
+        fits = [header.delimiter == delimiter and len(header.names) == cells for header in found]
+        scores = [number + 3 * (fit and number > 0) for number, fit in zip(known, fits, strict=True)]
+        return found[scores.index(max(scores))]
+    if first == 0 or (first == 1 and _is_count(path, rows)):
+        return _Header([str(k + 1) for k in range(cells)], 0, first, delimiter, "table without header")
     last = len(before) - 1 if first else 0
     mark, names = next((mark, names) for mark, names in _cells_of_header(before[last]))
     return _Header(names, rows.numbers[last], last + 1, mark, _with_header(mark))
@@ -131,11 +134,24 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
 
 def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
     """The names in a line, for each delimiter that the line has; units in brackets belong to the name before them."""
+    text = re.sub(r"^\s*(?:[%!]|//|;\s)\s*", "", text)  # marks of comments in other programs
     for mark in _DELIMITERS:
         if mark is None:
             yield mark, re.findall(r"\S+(?:\s+[\[(][^\s\])]*[\])])?", text)
         elif mark in text:
             yield mark, [name.strip() for name in split(text, mark)]
+
+
+def _is_count(path: AnyPath, rows: Rows) -> bool:
+    """Whether the first row is the number of the others; InputError if it is another number."""
+    text, given = rows.texts[0].strip(), len(rows.texts) - 1
+    if not re.fullmatch("[0-9]{1,15}", text):
+        return False
+    if int(text) != given:
+        raise InputError(
+            f"{path}, line {rows.numbers[0]}: {text} spheres declared, {given} given. Was the file cut off?"
+        )
+    return True
 
 
 def _with_header(delimiter: str | None) -> str:
@@ -183,7 +199,7 @@ def _without_names(
     path: AnyPath, rows: Rows, header: _Header, options: ReadOptions
 ) -> tuple[_Header, list[Column], NDArray, NDArray]:
     """Columns by their places, the format that these tell, and all values."""
-    cells, line = len(header.names), rows.numbers[0]
+    cells, line = len(header.names), rows.numbers[header.skip]
     if options.columns:
         columns = chosen_columns(path, line, header.names, options)
         return header, columns, *_values(rows, columns, cells, header)
@@ -194,7 +210,7 @@ def _without_names(
         )
     places = dict(zip(("x", "y", "z", "radius"), range(4), strict=True))
     everything = {name: k for k, name in enumerate(("x", "y", "z", "radius", "column 5")[:cells])}
-    values, lines = rows.columns(everything, cells, header.delimiter)
+    values, lines = rows.columns(everything, cells, header.delimiter, header.skip)
     numbered = _is_numbering(values[:, 0])
     format = "table without header, x y z radius"
     if cells == 4 and numbered and len(values) > 3 and np.ptp(values[:, 3]) > 0:
@@ -220,7 +236,7 @@ def _without_names(
         format = "table without header, x y z" if cells == 3 else format
     columns = [Column(role, place, str(place + 1)) for role, place in places.items()]
     return (
-        _Header(header.names, 0, 0, header.delimiter, format),
+        _Header(header.names, 0, header.skip, header.delimiter, format),
         columns,
         values[:, list(places.values())],
         lines,
