@@ -4,8 +4,8 @@ Cells are separated by commas, semicolons, tabs or blanks. The columns are found
 
 * by the names in a header, which may stand after other lines, or in a comment (numpy.savetxt);
 * by a comment ``#format x_y_z_r_matId``, as Yade's export.textExt writes it;
-* by their places, without a header, after the number of spheres or not: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
-  ``id x y z r`` (Voro++).
+* by their places, without a header: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
+  ``id x y z r`` (Voro++). A line with the number of spheres may stand before them.
 
 Lines that start with # are comments; ``# box_lower = 0 0 0`` and ``# box_upper = 1 1 1`` give the box, and
 ``##PERIODIC:: 1 1 1`` that of a periodic cell.
