@@ -268,7 +268,7 @@ def _check_number(path: AnyPath, declared: int, found: int, last_line: int) -> N
 
 def _by_id(path: AnyPath, ids: NDArray, lines: NDArray) -> NDArray:
     """The order of the rows by atom id."""
-    odd = np.flatnonzero(~((ids >= 0) & (ids < 2**53) & (ids % 1 == 0)))
+    odd = np.flatnonzero(~((ids >= 0) & (ids < 2**53) & (np.trunc(ids) == ids)))
     if len(odd):
         raise InputError(f"{path}, line {lines[odd[0]]}: atom id {ids[odd[0]]:g} is not a whole number.")
     order = np.argsort(ids, kind="stable")

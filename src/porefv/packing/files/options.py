@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from porefv.errors import InputError
 from porefv.packing.files.text import AnyPath, quoted
 from porefv.system.number_checks import is_finite_number
@@ -42,7 +44,7 @@ class ReadOptions:
             value = getattr(self, name)
             if value is not None and not (is_finite_number(value) and value > 0):
                 raise InputError(f"{path}: {name} must be a positive number of m, not {value!r}.")
-        if self.frame is not None and (isinstance(self.frame, bool) or not isinstance(self.frame, int)):
+        if self.frame is not None and (isinstance(self.frame, bool) or not isinstance(self.frame, int | np.integer)):
             raise InputError(f"{path}: frame must be a whole number, 0 for the first and -1 for the last.")
         if self.periodic not in (None, "ignore"):
             raise InputError(f'{path}: periodic must be "ignore", or not be given; it is {self.periodic!r}.')

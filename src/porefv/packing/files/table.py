@@ -213,7 +213,7 @@ def _without_names(
     values, lines = rows.columns(everything, cells, header.delimiter, header.skip)
     numbered = _is_numbering(values[:, 0])
     format = "table without header, x y z radius"
-    if cells == 4 and numbered and len(values) > 3 and np.ptp(values[:, 3]) > 0:
+    if cells == 4 and numbered and len(values) > 3 and values[:, 3].min() != values[:, 3].max():
         raise InputError(
             f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read "
             f"as x. {_HEADERLESS}"
@@ -221,7 +221,7 @@ def _without_names(
     if cells == 5 and any(comment.startswith(_PERIODIC) for _, comment in rows.comments):
         format = _SPHERE_PACK
     elif cells == 5:
-        whole = bool((values[:, 4] % 1 == 0).all())
+        whole = bool((np.trunc(values[:, 4]) == values[:, 4]).all())
         if numbered == whole:
             raise InputError(
                 f"{path}, line {line}: 5 columns without names are neither clearly id x y z radius (Voro++) nor "

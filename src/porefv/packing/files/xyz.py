@@ -99,4 +99,5 @@ def _corners(place: str, keys: dict[str, str]) -> Corners | None:
         raise InputError(f"{place}: Lattice must be nine numbers, and Origin three.") from None
     if np.count_nonzero(lattice - np.diag(np.diagonal(lattice))):
         raise InputError(f"{place}: the box is tilted; only axis-aligned boxes are read.")
-    return origin, origin + np.diagonal(lattice)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+        return origin, origin + np.diagonal(lattice)

@@ -36,11 +36,13 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     )
     corners, growth = _nfo(path, nfo, len(values)) if nfo.is_file() else (None, 1.0)
     notes = (f"diameters multiplied by {growth:.9g}, by the final porosity in {nfo.name}",) if growth != 1.0 else ()
+    with np.errstate(over="ignore"):  # what is not finite is refused later
+        radii = values[:, 3] * (growth / 2)
     note = "packing-generation makes periodic packings: the box has walls, and flow near them is not the bulk's"
     if options.periodic is None:
         warnings.warn(f'{path}: {note}. Give periodic = "ignore" to accept this.', PackingFileWarning, stacklevel=2)
     return FileContent(
-        "packing-generation .xyzd", values[:, :3], values[:, 3] * (growth / 2), corners, f"Dimensions in {nfo.name}",
+        "packing-generation .xyzd", values[:, :3], radii, corners, f"Dimensions in {nfo.name}",
         columns={"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, periodicity=note, notes=notes,
     )  # fmt: skip
 
