@@ -109,6 +109,12 @@ def test_periodic_boundaries_are_ignored_on_demand(read):
         assert read(content, periodic="ignore").reading.periodicity.startswith("periodic along x, y, z")
 
 
+def test_a_lattice_without_pbc_is_noted(read):
+    packing = read(XYZ.format(0.1).replace('pbc="F F F" ', ""))
+    assert packing.reading.notes == ("Lattice without pbc, read as a box with walls",)
+    assert read(XYZ.format(0.1)).reading.notes == ()
+
+
 def test_plain_xyz_needs_a_radius(read):
     content = "2\nmade by hand\nA 1 2 3\nB 4 5 6\n"
     np.testing.assert_array_equal(read(content, "a.xyz", radius=0.5).centres, [[1, 2, 3], [4, 5, 6]])

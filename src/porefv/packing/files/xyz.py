@@ -39,6 +39,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     values, numbers = rows.columns(positions(columns), len(names))
     centres, radii, unit, shown = spheres(place, columns, values, options)
     axes = "".join(axis for axis, flag in zip("xyz", keys.get("pbc", "").split(), strict=False) if flag[0] in "T1t")
+    if "lattice" in keys and "pbc" not in keys:
+        notes = (*notes, "Lattice without pbc, read as a box with walls")
     return FileContent(
         "extended XYZ", centres, radii, _corners(place, keys), "Lattice", unit, numbers, shown, chosen, len(starts),
         periodicity(place, axes, f'pbc="{keys.get("pbc", "")[:20]}"', options), notes,
