@@ -61,6 +61,7 @@ def test_check_tells_what_was_found_and_writes_nothing(scene, capsys):
     assert "scene.toml has no errors" in out
     assert "25 spheres, radii 0.111 to 0.2078 m" in out
     assert "y_min: 1 Pa, no-slip" in out
+    assert "table with header, separated by commas; no unit stated, taken as m; columns x, y, z, radius" in out
     assert "--force" not in out
     assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
 

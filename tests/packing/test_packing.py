@@ -321,3 +321,14 @@ def test_many_spheres_at_one_place_are_an_error_that_names_the_file():
 def test_every_packing_of_the_project_is_valid_in_its_own_box(path):
     packing = Packing.read(path).validate(wall_tolerance=0.01)
     assert packing.box.volume == 1 and "origin" in packing.metadata
+
+
+def test_bounding_box_holds_every_sphere_with_few_digits():
+    rng = np.random.default_rng(3)
+    for scale in (1e-6, 1.0, 1e4):
+        packing = Packing(scale * (rng.random((50, 3)) + 7.0), scale * (0.01 + 0.1 * rng.random(50)))
+        box = packing.bounding_box
+        assert (packing.radii[:, None] - box.wall_distances(packing.centres)).max() <= 1e-9 * scale
+        extent = (packing.centres + packing.radii[:, None]).max(axis=0)
+        np.testing.assert_allclose(box.upper, extent, atol=2e-5 * scale)
+    np.testing.assert_allclose(Packing([[0.5, 0.5, 0.5]], [0.4]).bounding_box.upper, 0.9, rtol=1e-15)

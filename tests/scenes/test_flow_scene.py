@@ -310,7 +310,9 @@ def test_scene_that_cannot_be_read_is_refused(tmp_path):
 def test_packing_without_box_tells_how_to_give_one(tmp_path):
     (tmp_path / "bare.csv").write_text("x,y,z,radius\n0.5,0.5,0.5,0.4\n")
     scene = FlowScene.from_mapping(mapping(packing="bare.csv"), directory=tmp_path)
-    with pytest.raises(InputError, match=r"bare.csv holds no box; give one in the scene:\n\[box\]"):
+    with pytest.raises(
+        InputError, match=r"(?s)bare.csv holds no box.*\[box\]\nlower = \[0.1, 0.1, 0.1\]\nupper = \[0.9, "
+    ):
         scene.check()
 
 

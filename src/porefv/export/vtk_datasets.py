@@ -57,12 +57,17 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
 
 
 def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
-    """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows)."""
+    """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows).
+
+    Field data `box_lower` and `box_upper` give the box, so that `Packing.read` reads a file of it back.
+    """
     n = len(packing)
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(packing.centres))
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
     attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
+    if packing.box is not None:
+        attach(polydata.GetFieldData(), {"box_lower": packing.box.lower, "box_upper": packing.box.upper}, 3)
     return polydata
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from porefv.errors import InputError, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
+from porefv.packing.reading import Reading
 
 _MOST_SHOWN = 5  # culprits listed in one error
 
@@ -33,10 +34,13 @@ class Source:
     path : path
     lines : (n,) integer array, optional
         Line of each sphere, counted from 1; None for binary formats.
+    reading : Reading, optional
+        What the reader understood of the file.
     """
 
     path: str | PathLike[str]
     lines: NDArray[np.integer] | None = None
+    reading: Reading | None = None
 
     def name(self, sphere: int) -> str:
         """``line 7 (sphere 5)``, or ``sphere 5`` if there are no lines."""
@@ -113,11 +117,24 @@ class Packing:
         )
 
     @classmethod
-    def read(cls, path: str | PathLike[str], format: str | None = None, box: Box | None = None) -> Packing:
+    def read(
+        cls,
+        path: str | PathLike[str],
+        format: str | None = None,
+        box: Box | None = None,
+        *,
+        columns: Mapping[str, str] | None = None,
+        radius: float | None = None,
+        scale: float | None = None,
+        frame: int | None = None,
+        periodic: str | None = None,
+    ) -> Packing:
         """Read a packing file: see `porefv.packing.read_packing`."""
         from porefv.packing.files.registry import read_packing
 
-        return read_packing(path, format=format, box=box)
+        return read_packing(
+            path, format, box, columns=columns, radius=radius, scale=scale, frame=frame, periodic=periodic
+        )
 
     def write(self, path: str | PathLike[str], format: str | None = None) -> None:
         """Write a packing file: see `porefv.packing.write_packing`."""
@@ -128,6 +145,20 @@ class Packing:
     def with_box(self, box: Box) -> Packing:
         """The same spheres in another box."""
         return replace(self, box=box)
+
+    @property
+    def bounding_box(self) -> Box:
+        """The smallest box, with corners of few digits, that holds every sphere."""
+        lower = (self.centres - self.radii[:, None]).min(axis=0)
+        upper = (self.centres + self.radii[:, None]).max(axis=0)
+        digit = 10.0 ** (np.floor(np.log10((upper - lower).max())) - 5)
+        # What rounding adds to a bound does not push it to the next digit.
+        return Box(np.floor(lower / digit + 1e-6) * digit, np.ceil(upper / digit - 1e-6) * digit)
+
+    @property
+    def reading(self) -> Reading | None:
+        """What the reader understood of the file; None if the spheres come from no file."""
+        return self.source.reading if self.source else None
 
     @cached_property
     def overlaps(self) -> Overlaps:
@@ -236,6 +267,11 @@ class Packing:
         enlarge = (
             f"Correct or remove these spheres, or give a box larger than {vector(box.lower)} to {vector(box.upper)}."
         )
+        if self.reading and self.reading.periodicity:
+            enlarge = (
+                "These spheres cross the boundaries of a periodic cell, whose other side porefv does not know. "
+                "Remove them, which leaves voids along the walls, or make the packing between walls."
+            )
         self._refuse(
             np.flatnonzero((distances <= 0).any(axis=1)),
             "centre not inside the box",

@@ -96,6 +96,7 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
         "pore_volume": packing.porosity * mesh.box.volume,
+        "reading": None if packing.reading is None else packing.reading.as_data(),
     }
 
 

@@ -9,7 +9,6 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from porefv.conductance.model import ConductanceModel
-from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
@@ -196,13 +195,7 @@ class FlowScene(Scene):
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
-        packing = Packing.read(self.packing.file, format=self.packing.format, box=self.box)
-        if packing.box is None:
-            raise InputError(
-                f"{self.path or 'scene'}: {self.packing.file} holds no box; give one in the scene:\n"
-                "[box]\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]"
-            )
-        return packing
+        return self.packing.read(self.path, self.box)
 
     def pore_mesh(self, packing: Packing | None = None) -> PoreMesh:
         """The mesh of the packing, which is read and validated."""
