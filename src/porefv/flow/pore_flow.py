@@ -297,7 +297,7 @@ class PoreFlow(FixedInputs):
     @lazy_property
     def reliability(self) -> Reliability:
         """Parts of the dissipation in throats outside the range where the conductance model was tested."""
-        return reliability(self)
+        return reliability(self.mesh, self.conductances, self.flux, self.walls.slip)
 
     # ---- quantities of the sample ---------------------------------------------------------------------------------
 
