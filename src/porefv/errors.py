@@ -89,6 +89,10 @@ class ImbalanceWarning(PorefvWarning):
     """A pressure that was found elsewhere leaves more of the flow out of balance than rounding explains."""
 
 
+class FreeSpaceWarning(PorefvWarning):
+    """There is more room between a wall and the grains than between grains."""
+
+
 class OutOfRangeWarning(PorefvWarning):
     """Much of a flow is in throats of a kind that the conductance model was not tested on."""
 

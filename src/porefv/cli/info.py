@@ -63,6 +63,7 @@ def _summary_text(results: Results) -> str:
             ("hidden spheres", packing["hidden_spheres"] or None),
             ("overlapping pairs", count_text(packing['overlapping_pairs'])),
             ("porosity", f"{packing['porosity']:.6g}"),
+            *_wall_rows(packing),
             ("pore volume", f"{packing['pore_volume']:.6g} m³"),
         ]),
         ("Pores", [
@@ -88,6 +89,18 @@ def _summary_text(results: Results) -> str:
     return "\n".join(lines)
 
 
+def _wall_rows(packing: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """The walls that have free space between them and the grains."""
+    rows = []
+    for name, wall in packing.get("walls", {}).items():
+        if wall["free_space"]:
+            text = f"{name}: nearest sphere {wall['gap']:.3g} m away"
+            if wall["porosity"] is not None:
+                text += f", porosity {wall['porosity']:.2f}, inside {wall['inside']:.2f}"
+            rows.append(("free space", text))
+    return rows
+
+
 def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     if "flow" not in summary:
         return []
@@ -104,9 +117,17 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     if "permeability" in summary:
         rows += [
             ("permeability", f"{summary['permeability']:.6g} m²"),
+            ("inside", _inside(summary.get("interior"))),
             ("hydraulic conductivity", f"{summary['hydraulic_conductivity']:.6g} m/s"),
         ]
     return rows
+
+
+def _inside(found: Mapping[str, Any] | None) -> str | None:
+    """Permeability and porosity two mean diameters away from the walls."""
+    if found is None or found["permeability"] is None:
+        return None
+    return f"permeability {found['permeability']:.6g} m², porosity {found['porosity']:.4f}, away from the walls"
 
 
 def _outside(found: Mapping[str, float] | None) -> str | None:

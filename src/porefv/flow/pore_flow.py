@@ -21,6 +21,7 @@ from porefv.flow.fluid import Fluid
 from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
 from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.given_pressure import given_pressure
+from porefv.flow.interior import Interior, interior
 from porefv.flow.pressure import (
     PressureField,
     held_pressures,
@@ -293,6 +294,18 @@ class PoreFlow(FixedInputs):
         missing = float((holes * drop[doubtful] ** 2).sum())
         power = float((self.conductances * drop**2).sum())
         return missing / (power + missing) if missing > 0.0 else 0.0
+
+    @lazy_property
+    def interior(self) -> Interior | None:
+        """Porosity and permeability two mean diameters away from walls and free space; None in small samples.
+
+        Raises
+        ------
+        InputError
+            If the pressure walls are not one pair of opposite walls.
+        """
+        axis = axis_number(None, self.walls)
+        return interior(self.mesh, self.pressure, self.pore_velocity, axis, self.fluid.viscosity)
 
     @lazy_property
     def reliability(self) -> Reliability:

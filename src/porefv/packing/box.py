@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError, vector
+
+if TYPE_CHECKING:
+    from porefv.packing.packing import Packing
 
 Floats = NDArray[np.float64]
 
@@ -93,6 +97,12 @@ class Box:
         """The box whose walls are at these coordinates, (6,), each along its axis, m."""
         places = np.asarray(places, dtype=np.float64)
         return cls(places[0::2], places[1::2])
+
+    @classmethod
+    def around(cls, packing: Packing) -> Box:
+        """The smallest box that holds every sphere of a packing: each wall touches one."""
+        radii = packing.radii[:, None]
+        return cls((packing.centres - radii).min(axis=0), (packing.centres + radii).max(axis=0))
 
     def wall_distances(self, points: Floats) -> Floats:
         """(n, 6) distance of each point (n, 3) from each wall, m; positive inside."""

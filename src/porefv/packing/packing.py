@@ -14,6 +14,7 @@ from porefv.errors import InputError, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
 from porefv.packing.reading import Reading
+from porefv.system.number_checks import is_finite_number
 
 _MOST_SHOWN = 5  # culprits listed in one error
 
@@ -92,6 +93,11 @@ class Packing:
         metadata: dict[str, str] | None = None,
     ):
         centres, radii = read_only(centres, "centres"), read_only(radii, "radii")
+        if box is not None and not isinstance(box, Box):
+            try:
+                box = Box(*box)
+            except TypeError:
+                raise InputError(f"box must be a Box, or its two corners, not {box!r}") from None
         given = {"centres": centres, "radii": radii, "box": box, "source": source, "metadata": metadata or {}}
         for name, value in given.items():
             object.__setattr__(self, name, value)
@@ -145,6 +151,33 @@ class Packing:
     def with_box(self, box: Box) -> Packing:
         """The same spheres in another box."""
         return replace(self, box=box)
+
+    def scaled(self, factor: float) -> Packing:
+        """The packing with all lengths, those of its box included, multiplied by a factor."""
+        if not (is_finite_number(factor) and factor > 0.0):
+            raise InputError(f"the factor of lengths must be a positive number, not {factor!r}")
+        box = None if self.box is None else Box(self.box.lower * factor, self.box.upper * factor)
+        return replace(self, centres=self.centres * factor, radii=self.radii * factor, box=box)
+
+    def cropped(self, box: Box) -> Packing:
+        """The spheres whose centres lie in a box, in that box.
+
+        Spheres that reach beyond its walls are cut by them: the part inside stays. Such a packing needs a
+        `wall_tolerance` of the mesh that is large enough, up to 1. Of spheres whose centres are outside, the caps that
+        reach into the box are lost; `metadata` says how many they were.
+
+        Raises
+        ------
+        InputError
+            If no centre is in the box.
+        """
+        distances = box.wall_distances(self.centres)
+        inside = (distances > 0.0).all(axis=1)
+        if not inside.any():
+            raise InputError(f"{self._path()}no centre lies in the box {vector(box.lower)} to {vector(box.upper)}.")
+        lost = int(np.count_nonzero(~inside & (distances > -self.radii[:, None]).all(axis=1)))
+        metadata = self.metadata | ({"caps_lost": str(lost)} if lost else {})
+        return Packing(self.centres[inside], self.radii[inside], box, metadata=metadata)
 
     @property
     def bounding_box(self) -> Box:

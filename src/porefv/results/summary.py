@@ -7,6 +7,7 @@ import math
 import platform
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import ComputationError, printable
 from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
+from porefv.packing.free_space import WallLayer, wall_layers
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
 
@@ -95,9 +97,15 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "radii": [packing.radii.min(), packing.radii.max()],
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
+        "walls": {layer.wall: _wall_layer(layer) for layer in wall_layers(packing)},
         "pore_volume": packing.porosity * mesh.box.volume,
         "reading": None if packing.reading is None else packing.reading.as_data(),
     }
+
+
+def _wall_layer(layer: WallLayer) -> dict[str, float | bool | None]:
+    known = {"porosity": _known(layer.porosity), "inside": _known(layer.inside)}
+    return {"gap": layer.gap, **known, "free_space": layer.free}
 
 
 def _mesh(mesh: PoreMesh) -> dict[str, Any]:
@@ -134,6 +142,7 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
         found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
+        found["interior"] = None if flow.interior is None else _finite(asdict(flow.interior))
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity
     if "forces" in quantities:
         forces = flow.forces
@@ -178,6 +187,10 @@ def _versions(used: Sequence[str]) -> dict[str, str]:
 
 def _plain(value: Any) -> Any:
     return value.tolist()  # numpy's arrays and numbers
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: _known(value) for name, value in values.items()}
 
 
 def _known(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
@@ -9,16 +10,19 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from porefv.conductance.model import ConductanceModel
+from porefv.errors import FreeSpaceWarning
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
+from porefv.packing.free_space import free_space, wall_layers
 from porefv.packing.packing import Packing
 from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.errors import refused
 from porefv.scenes.shared_tables import (
+    BoxOrFit,
     BoxTable,
     ConductanceTable,
     FluidTable,
@@ -136,7 +140,7 @@ class FlowScene(Scene):
     Attributes
     ----------
     packing : PackingFile
-    box : Box or None
+    box : Box, str or None
         None: the box is in the packing file.
     fluid : Fluid
     walls : Walls
@@ -153,8 +157,11 @@ class FlowScene(Scene):
     """
 
     packing: Annotated[PackingFile, PathOrTable()] = key("the packing file: a path, or the table `[packing]`")
-    box: Annotated[Box, MadeFrom(BoxTable)] | None = key(
-        "the table `[box]`: the box that confines the packing", None, shown="from the packing file"
+    box: Annotated[Box | str, BoxOrFit(BoxTable)] | None = key(
+        'the box that confines the packing: the table `[box]`, or `"fit"` (each wall touches the outermost sphere), or '
+        '`"bed"` (so do walls with free space; the others are those of the file)',
+        None,
+        shown="from the packing file",
     )
     fluid: Annotated[Fluid, MadeFrom(FluidTable)] = key("the table `[fluid]`: what fills the pores", {})
     walls: Annotated[Walls, MadeFrom(WallsTable)] = key("the table `[walls]`: what the walls do to the fluid", {})
@@ -242,6 +249,7 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
+                _warn_of_free_space(packing)
             output.sections.check(output.quantities, self.walls, mesh.box)
             flow = self.pore_flow(mesh) if output.quantities else None
             save(
@@ -266,5 +274,12 @@ class FlowScene(Scene):
         """
         check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
         mesh = self.pore_mesh()
+        _warn_of_free_space(mesh.packing)
         self.output.sections.check(self.output.quantities, self.walls, mesh.box)
         return mesh.packing
+
+
+def _warn_of_free_space(packing: Packing) -> None:
+    said = free_space(wall_layers(packing), float(packing.radii.mean()))
+    if said is not None:
+        warnings.warn(said, FreeSpaceWarning, stacklevel=2)

@@ -15,9 +15,10 @@ from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.packing.box import WALLS, Box
 from porefv.packing.files.registry import FORMATS
+from porefv.packing.free_space import FITS, fitted
 from porefv.packing.packing import Packing
 from porefv.scenes.errors import refused
-from porefv.scenes.table import OneOf, Table
+from porefv.scenes.table import MadeFrom, OneOf, Table
 from porefv.scenes.values import Choice, Integer, Limits, ScenePath, Text, Vector, key
 
 CONDUCTANCES = ("auto", *MODELS)
@@ -86,14 +87,14 @@ class PackingFile(Table):
         shown="a periodic packing is an error",
     )
 
-    def read(self, scene: Path | None, box: Box | None) -> Packing:
-        """The packing in the box given, or else in that of the file.
+    def read(self, scene: Path | None, box: Box | str | None) -> Packing:
+        """The packing in the box given, or in that of the file; a word places walls by the spheres (`fitted`).
 
         Parameters
         ----------
         scene : Path or None
             The scene file, for errors.
-        box : Box or None
+        box : Box, str or None
 
         Raises
         ------
@@ -102,9 +103,11 @@ class PackingFile(Table):
         """
         columns = {} if self.columns is None else {role: name for role, name in self.columns if name is not None}
         packing = Packing.read(
-            self.file, self.format, box,
+            self.file, self.format, None if isinstance(box, str) else box,
             columns=columns, radius=self.radius, scale=self.scale, frame=self.frame, periodic=self.periodic,
         )  # fmt: skip
+        if isinstance(box, str) and (packing.box is not None or box == "fit"):
+            return fitted(packing, box)
         if packing.box is None:
             around = packing.bounding_box
             lower, upper = (
@@ -112,9 +115,24 @@ class PackingFile(Table):
             )
             raise InputError(
                 f"{scene or 'scene'}: {self.file} holds no box; give one in the scene, such as that of the spheres:\n"
-                f"[box]\nlower = [{lower}]\nupper = [{upper}]"
+                f'[box]\nlower = [{lower}]\nupper = [{upper}]\nor place its walls at the outermost spheres: box = "fit"'
             )
         return packing
+
+
+class BoxOrFit:
+    """A field whose value is the table [box], or a word that places the walls by the spheres."""
+
+    def __init__(self, table: type[BoxTable]):
+        self.table = table
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        kinds = OneOf(
+            lambda value: "word" if isinstance(value, str) else "table",
+            word=Annotated[str, Choice(FITS)],
+            table=Annotated[Box, MadeFrom(self.table)],
+        )
+        return kinds.__get_pydantic_core_schema__(source, handler)
 
 
 class PathOrTable:

@@ -19,7 +19,14 @@ from porefv.packing.box import Box
 from porefv.packing.packing import Packing
 from porefv.scenes.errors import refused
 from porefv.scenes.material_table import MaterialTable
-from porefv.scenes.shared_tables import BoxFromOriginTable, ConductanceTable, FluidTable, PackingFile, PathOrTable
+from porefv.scenes.shared_tables import (
+    BoxFromOriginTable,
+    BoxOrFit,
+    ConductanceTable,
+    FluidTable,
+    PackingFile,
+    PathOrTable,
+)
 from porefv.scenes.stage import Stage
 from porefv.scenes.table import MadeFrom, OneOf, Scene, Table
 from porefv.scenes.values import Choice, Fraction, Limits, ScenePath, Seconds, Vector, Whole, key
@@ -115,7 +122,7 @@ class SimulationScene(Scene):
     Attributes
     ----------
     packing : PackingFile
-    box : Box or None
+    box : Box, str or None
         None: the box is in the packing file [m].
     material : Material
     gravity : (float, float, float)
@@ -142,8 +149,11 @@ class SimulationScene(Scene):
     """
 
     packing: Annotated[PackingFile, PathOrTable()] = key("the packing file: a path, or the table `[packing]`")
-    box: Annotated[Box, MadeFrom(BoxFromOriginTable)] | None = key(
-        "the table `[box]`: the box that confines the packing", None, shown="from the packing file"
+    box: Annotated[Box | str, BoxOrFit(BoxFromOriginTable)] | None = key(
+        'the box that confines the packing: the table `[box]`, or `"fit"` (each wall touches the outermost sphere), '
+        'or `"bed"` (so do walls with free space; the others are those of the file)',
+        None,
+        shown="from the packing file",
     )
     material: Annotated[Material, MadeFrom(MaterialTable)] = key("the table `[material]`: what grains are made of", {})
     gravity: Vector = key("acceleration of gravity, of grains and fluid", (0.0, 0.0, 0.0), unit="m/s²")
