@@ -44,9 +44,11 @@ if TYPE_CHECKING:
     from porefv.flow.fluid import Fluid
     from porefv.flow.flux import fluxes
     from porefv.flow.forces import Forces, grain_forces
+    from porefv.flow.inside import FixedPressure, Source
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
     from porefv.flow.pressure_on_grains import acting_pressure
+    from porefv.flow.regions import Point, Sphere
     from porefv.flow.walls import Wall, Walls
     from porefv.mesh.cell_mesh import CellMesh
     from porefv.mesh.facets import Facets
@@ -63,17 +65,21 @@ _HOMES = {
     "ConductanceModel": "porefv.conductance.model",
     "EffectiveRadius": "porefv.conductance.effective_radius",
     "Facets": "porefv.mesh.facets",
+    "FixedPressure": "porefv.flow.inside",
     "Fluid": "porefv.flow.fluid",
     "Forces": "porefv.flow.forces",
     "HydraulicRadius": "porefv.conductance.hydraulic_radius",
     "InputError": "porefv.errors",
     "Packing": "porefv.packing.packing",
+    "Point": "porefv.flow.regions",
     "PoreFlow": "porefv.flow.pore_flow",
     "PoreMesh": "porefv.mesh.pore_mesh",
     "PorefvError": "porefv.errors",
     "PressureField": "porefv.flow.pressure",
     "RegularTriangulation": "porefv.tessellation.triangulation",
     "SectionFriction": "porefv.conductance.section_friction.model",
+    "Source": "porefv.flow.inside",
+    "Sphere": "porefv.flow.regions",
     "Throats": "porefv.mesh.throats",
     "WALLS": "porefv.packing.box",
     "Wall": "porefv.flow.walls",
@@ -92,17 +98,21 @@ __all__ = [
     "ConductanceModel",
     "EffectiveRadius",
     "Facets",
+    "FixedPressure",
     "Fluid",
     "Forces",
     "HydraulicRadius",
     "InputError",
     "Packing",
+    "Point",
     "PoreFlow",
     "PoreMesh",
     "PorefvError",
     "PressureField",
     "RegularTriangulation",
     "SectionFriction",
+    "Source",
+    "Sphere",
     "Throats",
     "Wall",
     "Walls",

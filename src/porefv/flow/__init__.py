@@ -3,13 +3,17 @@
 from porefv.flow.fluid import Fluid
 from porefv.flow.flux import fluxes
 from porefv.flow.forces import Forces, grain_forces
+from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
+from porefv.flow.inside import FixedPressure, Source
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import PressureField, solve_pressure
 from porefv.flow.pressure_on_grains import SolidPressureWeights, acting_pressure, solid_pressure_weights
+from porefv.flow.regions import Point, Sphere
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Wall, Walls
 
 __all__ = [
-    "Fluid", "Forces", "PoreFlow", "PressureField", "SolidPressureWeights", "Wall", "Walls", "acting_pressure",
-    "fluxes", "grain_forces", "pore_velocities", "solid_pressure_weights", "solve_pressure",
+    "FixedPressure", "FlowAtWalls", "Fluid", "Forces", "Point", "PoreFlow", "PressureField", "SolidPressureWeights",
+    "Source", "Sphere", "Wall", "Walls", "acting_pressure", "fluxes", "grain_forces", "pore_velocities",
+    "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
 ]  # fmt: skip
