@@ -177,6 +177,11 @@ class PoreFlow(FixedInputs):
         return self._inside.sources if self.sources and self._inside is not None else None
 
     @property
+    def flow_of_sources(self) -> np.ndarray:
+        """(n_pores,): volume that sources inject into each pore per unit time [m³/s]."""
+        return np.zeros(self.mesh.n_pores) if self._sources is None else self._sources
+
+    @property
     def _inside_pressures(self) -> np.ndarray | None:
         """(n_pores,): fixed pressure of each pore, NaN where there is none; None without fixed pressures [Pa]."""
         return self._inside.pressures if self.fixed_pressures and self._inside is not None else None
@@ -421,10 +426,9 @@ class PoreFlow(FixedInputs):
 
     def to_fipy(self) -> FipyProblem:
         """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
-        from porefv.fipy.pore_mesh import FipyPoreMesh
         from porefv.fipy.pressure_problem import FipyProblem
 
-        return FipyProblem(self, FipyPoreMesh(self.mesh, ~np.isnan(self._held)))
+        return FipyProblem(self)
 
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 
