@@ -86,6 +86,11 @@ def vector_text(values: Iterable[float]) -> str:
     return ", ".join(f"{value:.6g}" for value in values)
 
 
+def axes_text(values: Mapping[str, float]) -> str:
+    """Values along x, y and z."""
+    return ", ".join(f"{axis} {values[axis]:.6g}" for axis in "xyz")
+
+
 def path_text(path: str | os.PathLike[str]) -> str:
     """A path without redundant parts."""
     return str(Path(os.path.normpath(path)))

@@ -14,17 +14,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv.errors import ComputationError
+from porefv.flow.regions import region_text
 from porefv.packing.box import WALLS
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
 
 if TYPE_CHECKING:
+    from porefv.flow.directional_permeabilities import DirectionalPermeabilities
     from porefv.flow.pore_flow import PoreFlow
     from porefv.mesh.pore_mesh import PoreMesh
 
 UNITS = {
-    "permeability": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
-    "wall_flux": "m3/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
+    "permeability": "m2", "permeabilities": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
+    "wall_flux": "m3/s", "wall_pressure": "Pa", "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
 }  # fmt: skip
 
@@ -37,6 +39,7 @@ def summary_json(
     vtk: bool,
     table_format: str,
     seconds: Mapping[str, float],
+    permeabilities: DirectionalPermeabilities | None = None,
     scene: str | None = None,
     packing: str | None = None,
 ) -> str:
@@ -51,6 +54,7 @@ def summary_json(
         What was asked for.
     seconds : mapping of str to float
         Wall time of each stage.
+    permeabilities : DirectionalPermeabilities, optional
     scene, packing : str, optional
         Names of the files.
     """
@@ -61,6 +65,7 @@ def summary_json(
         "packing": {"file": packing, **_packing(mesh)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
+        **({} if permeabilities is None else {"permeabilities": vars(permeabilities)}),
         "seconds": {**seconds, "total": sum(seconds.values())},
         "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
         "units": UNITS,
@@ -104,7 +109,9 @@ def _mesh(mesh: PoreMesh) -> dict[str, Any]:
 
 def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dict[str, Any]:
     walls = {
-        name: {"pressure": wall.pressure, "slip": bool(wall.slip)} for name, wall in zip(WALLS, flow.walls, strict=True)
+        name: {"pressure": wall.pressure, "slip": bool(wall.slip)}
+        | {key: value for key in ("inflow", "velocity") if (value := getattr(wall, key)) is not None}
+        for name, wall in zip(WALLS, flow.walls, strict=True)
     }
     found: dict[str, Any] = {
         "fluid": {"viscosity": flow.fluid.viscosity, "density": flow.fluid.density},
@@ -118,10 +125,18 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             "imbalance": flow.imbalance,
             "closing_error": flow.closing_error,
             "wall_flux": flow.wall_flux,
+            "wall_pressure": flow.wall_pressure,
         },
         "unusual": _unusual(flow),
         "solver": {name: _known(value) for name, value in vars(flow.solver_report).items()},
     }
+    if flow.sources:
+        found["sources"] = [{"region": region_text(s.region), "flow": s.flow} for s in flow.sources]
+    if flow.fixed_pressures:
+        found["pressures"] = [
+            {"region": region_text(fixed.region), "pressure": fixed.pressure, "flow": flux}
+            for fixed, flux in zip(flow.fixed_pressures, flow.fixed_pressure_flux, strict=True)
+        ]
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity

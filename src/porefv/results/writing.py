@@ -12,7 +12,7 @@ A directory holds what was asked for of::
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -22,6 +22,11 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
+from porefv.flow.directional_permeabilities import (
+    DirectionalPermeabilities,
+    directional_permeabilities,
+    slip_of_impervious_walls,
+)
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
@@ -30,7 +35,9 @@ from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
 
-QUANTITIES = ("permeability", "pressure", "forces")
+QUANTITIES = ("permeability", "permeabilities", "pressure", "forces")
+# What is written unless something else is asked for: all that follows from one flow.
+OF_ONE_FLOW = ("permeability", "pressure", "forces")
 FILES = ("summary.json", *FORCE_FILES.values(), "pores.vtu", "spheres.vtp", "throats.vtp")
 
 
@@ -38,7 +45,7 @@ def write(
     flow: PoreFlow,
     directory: str | PathLike[str],
     *,
-    quantities: Collection[str] = QUANTITIES,
+    quantities: Collection[str] = OF_ONE_FLOW,
     vtk: bool = True,
     table_format: str = "csv",
     force: bool = False,
@@ -51,7 +58,8 @@ def write(
     directory : path
         Made with its parents; must not exist, or be empty.
     quantities : collection of str
-        Among `QUANTITIES`.
+        Among `QUANTITIES`. "permeabilities" is as of `directional_permeabilities`, with the slip of the walls that
+        fluid does not pass.
     vtk : bool
         Write pores.vtu, spheres.vtp and throats.vtp.
     table_format : str
@@ -68,7 +76,13 @@ def write(
     if unknown:
         raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     with writing(directory, force=force, vtk=vtk, table_format=table_format) as folder:
-        save(folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format)
+        save(
+            folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format,
+            permeabilities=lambda: directional_permeabilities(
+                flow.mesh, flow.fluid, flow.conductance, slip=slip_of_impervious_walls(flow.walls),
+                solver=flow.solver, tolerance=flow.tolerance,
+            ),
+        )  # fmt: skip
     return Path(directory)
 
 
@@ -112,11 +126,13 @@ def check_target(directory: str | PathLike[str], *, vtk: bool, table_format: str
 
 def stages(quantities: Collection[str], vtk: bool) -> tuple[str, ...]:
     """Stages of `save`, in order."""
+    driven = any(quantity in OF_ONE_FLOW for quantity in quantities)
     asked = {
-        "throats": bool(quantities),
-        "pressure": bool(quantities),
+        "throats": driven,
+        "pressure": driven,
         "forces": "forces" in quantities,
         "velocities": vtk and "pressure" in quantities,
+        "permeabilities": "permeabilities" in quantities,
     }
     return ("triangulation", *(stage for stage, wanted in asked.items() if wanted), "writing")
 
@@ -130,6 +146,7 @@ def save(
     vtk: bool,
     table_format: str,
     progress: Progress | None = None,
+    permeabilities: Callable[[], DirectionalPermeabilities] | None = None,
     scene: str | None = None,
     packing: str | None = None,
 ) -> None:
@@ -146,6 +163,8 @@ def save(
         As for `write`.
     progress : Progress, optional
         Has the stages that `stages` returns; quiet by default.
+    permeabilities : function, optional
+        Computes the permeabilities along all axes, if they are asked for.
     scene, packing : str, optional
         Names of the files, for summary.json.
     """
@@ -163,14 +182,18 @@ def save(
         if vtk and "pressure" in quantities:
             with progress.stage("velocities"):
                 flow.pore_velocity  # noqa: B018
+    along_axes = None
+    if permeabilities is not None and "permeabilities" in quantities:
+        with progress.stage("permeabilities"):
+            along_axes = permeabilities()
     with progress.stage("writing"):
         if flow is not None and "forces" in quantities:
             write_forces(flow, folder / FORCE_FILES[table_format])
         if vtk:
             _write_vtk(folder, mesh, flow, quantities)
     text = summary_json(
-        mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds, scene=scene,
-        packing=packing,
+        mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds,
+        permeabilities=along_axes, scene=scene, packing=packing,
     )  # fmt: skip
     (folder / "summary.json").write_text(text, encoding="utf-8")
 

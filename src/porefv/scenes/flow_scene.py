@@ -6,18 +6,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from porefv.conductance.model import ConductanceModel
 from porefv.errors import InputError
+from porefv.flow.directional_permeabilities import (
+    DirectionalPermeabilities,
+    directional_permeabilities,
+    slip_of_impervious_walls,
+)
 from porefv.flow.fluid import Fluid
+from porefv.flow.inside import FixedPressure, Source
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.walls import Wall, Walls
+from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.errors import refused
+from porefv.scenes.region_tables import FixedPressureTable, SourceTable
 from porefv.scenes.shared_tables import (
     BoxTable,
     ConductanceTable,
@@ -40,14 +47,28 @@ class WallTable(Table):
     """What a wall does to the fluid."""
 
     pressure: float | None = key(
-        "imposed piezometric pressure. Without it the wall is impervious. Not for `lateral`", None, unit="Pa"
+        "imposed piezometric pressure. A wall with neither this nor an imposed flow is impervious. Not for `lateral`",
+        None,
+        unit="Pa",
     )
     slip: bool = key(
         "whether the fluid slips along the wall, as along a plane of symmetry. If not, the wall drags it", False
     )
 
+    inflow: float | None = key(
+        "instead of `pressure`: imposed flow into the sample, negative out of it. The wall has "
+        "[one pressure, which is found](boundary.md#a-flow-through-a-wall)",
+        None,
+        unit="m³/s",
+    )
+    velocity: float | None = key(
+        "instead of `inflow`: imposed Darcy velocity into the sample, which is the flow over the area of the wall",
+        None,
+        unit="m/s",
+    )
+
     def make(self) -> Wall:
-        return Wall(self.pressure, self.slip)
+        return Wall(self.pressure, self.slip, self.inflow, self.velocity)
 
 
 class WallsTable(SixWalls[Annotated[Wall, MadeFrom(WallTable)]]):
@@ -105,7 +126,9 @@ class FlowOutput(Table):
         "results",
     )
     quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
-        'what is computed: any of `"permeability"`, `"pressure"`, `"forces"`. An empty list computes the pores alone',
+        'what is computed: any of `"permeability"`, `"permeabilities"` (along x, y and z, see '
+        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`. An empty list computes the '
+        "pores alone",
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
@@ -126,6 +149,8 @@ class FlowScene(Scene):
         None: the box is in the packing file.
     fluid : Fluid
     walls : Walls
+    sources : tuple of Source
+    pressures : tuple of FixedPressure
     mesh : MeshOptions
     flow : FlowOptions
     output : FlowOutput
@@ -144,29 +169,64 @@ class FlowScene(Scene):
     )
     fluid: Annotated[Fluid, MadeFrom(FluidTable)] = key("the table `[fluid]`: what fills the pores", {})
     walls: Annotated[Walls, MadeFrom(WallsTable)] = key("the table `[walls]`: what the walls do to the fluid", {})
+    sources: Annotated[tuple[Annotated[Source, MadeFrom(SourceTable)], ...], Field(strict=False)] = key(
+        "a table `[[sources]]` for each flow into a region of the packing", (), shown="none"
+    )
+    pressures: Annotated[tuple[Annotated[FixedPressure, MadeFrom(FixedPressureTable)], ...], Field(strict=False)] = key(
+        "a table `[[pressures]]` for each region whose pores have a given pressure", (), shown="none"
+    )
     mesh: MeshOptions = key("the table `[mesh]`: tolerances of the mesh of pores", {})
     flow: Annotated[FlowOptions, MadeFrom(FlowTable)] = key("the table `[flow]`: how the flow is computed", {})
     output: FlowOutput = key("the table `[output]`: what is computed and written, and where", {})
 
     @model_validator(mode="after")
     def _is_driven(self) -> Self:
-        """The walls drive what is asked for."""
+        """The walls and regions drive what is asked for."""
         asked = self.output.quantities
-        held = [(name, wall) for name, wall in zip(WALLS, self.walls, strict=True) if wall.pressure is not None]
-        if asked and not held:
+        if "permeabilities" in asked:
+            try:
+                slip_of_impervious_walls(self.walls)
+            except InputError as error:
+                raise refused(str(error), "walls") from None
+        if not self.driven:
+            return self
+        passed = [
+            (name, wall)
+            for name, wall in zip(WALLS, self.walls, strict=True)
+            if wall.pressure is not None or wall.imposes_flow
+        ]
+        if not passed and not self.pressures:
             raise refused(
-                f"no wall has a pressure, and {', '.join(asked)} cannot be computed without. "
+                f"no wall has a pressure, and {', '.join(self.driven)} cannot be computed without. "
                 "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
             )
-        pressures = self.walls.pressures
-        axis = self.walls.axis
-        if "permeability" in asked and (axis is None or pressures[2 * axis] == pressures[2 * axis + 1]):
-            described = ", ".join(f"{name} at {wall.pressure:g} Pa" for name, wall in held)
-            raise refused(
-                "permeability needs exactly two pressure walls, opposite each other and at "
-                f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
-            )
+        if "permeability" in asked:
+            axis, pressures = self.walls.axis, self.walls.pressures
+            described = ", ".join(f"{name} at {condition_text(vars(wall))}" for name, wall in passed)
+            if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
+                raise refused(
+                    "permeability needs exactly two pressure walls, opposite each other and at "
+                    f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
+                )
+            if self.sources or self.pressures:
+                raise refused(
+                    "permeability is that between two walls, without [[sources]] and [[pressures]]. Drop it from the "
+                    "quantities, or drop these tables."
+                )
         return self
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """The quantities that need the flow of the walls and regions of the scene."""
+        return tuple(name for name in self.output.quantities if name != "permeabilities")
+
+    def ensure_driven_by_pressures_of_walls(self) -> None:
+        """InputError if anything but pressures of walls drives the flow."""
+        if self.walls.imposes_flow.any() or self.sources or self.pressures:
+            raise InputError(
+                f"{self.path or 'scene'}: only flows that pressures of walls drive can be compared and resolved; drop "
+                "imposed flows, [[sources]] and [[pressures]]"
+            )
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
@@ -183,16 +243,28 @@ class FlowScene(Scene):
         return PoreMesh(self.read_packing() if packing is None else packing, **dict(self.mesh))
 
     def pore_flow(self, mesh: PoreMesh | None = None) -> PoreFlow:
-        """The flow through the packing: nothing is computed yet."""
-        return PoreFlow(
-            self.pore_mesh() if mesh is None else mesh,
-            self.walls,
-            self.fluid,
-            self.flow.conductance,
-            gravity=self.flow.gravity,
-            solver=self.flow.solver,
-            tolerance=self.flow.tolerance,
-        )
+        """The flow through the packing: nothing is computed yet.
+
+        Raises
+        ------
+        InputError
+            If what is imposed on walls and regions contradicts itself, or lies outside the box.
+        """
+        mesh = self.pore_mesh() if mesh is None else mesh
+        try:
+            return PoreFlow(
+                mesh, self.walls, self.fluid, self.flow.conductance, gravity=self.flow.gravity, sources=self.sources,
+                fixed_pressures=self.pressures, solver=self.flow.solver, tolerance=self.flow.tolerance,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(f"{self.path or 'scene'}: {error}") from None
+
+    def permeabilities(self, mesh: PoreMesh | None = None) -> DirectionalPermeabilities:
+        """Permeabilities along all axes; the walls beside the flow slip as those of the scene that fluid does not pass."""
+        return directional_permeabilities(
+            self.pore_mesh() if mesh is None else mesh, self.fluid, self.flow.conductance,
+            slip=slip_of_impervious_walls(self.walls), solver=self.flow.solver, tolerance=self.flow.tolerance,
+        )  # fmt: skip
 
     def solve(self, *, force: bool = False, progress: Progress | None = None) -> Path:
         """Compute what `output` asks for, and write the results directory.
@@ -223,10 +295,10 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
-            flow = self.pore_flow(mesh) if output.quantities else None
+            flow = self.pore_flow(mesh) if self.driven else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
-                progress=progress, scene=str(self.path) if self.path else None, packing=str(self.packing.file),
+                progress=progress, permeabilities=lambda: self.permeabilities(mesh), scene=str(self.path) if self.path else None, packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
 
@@ -244,4 +316,7 @@ class FlowScene(Scene):
             As `solve`, save that results may exist.
         """
         check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
-        return self.pore_mesh().packing
+        mesh = self.pore_mesh()
+        if self.driven:
+            self.pore_flow(mesh)
+        return mesh.packing

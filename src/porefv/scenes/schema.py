@@ -34,8 +34,8 @@ class TomlSchema(GenerateJsonSchema):
         return self.generate_inner(schema["schema"])
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
-        # None and {} stand for keys and tables that are left out.
-        left_out = schema.get("default") in (None, {})
+        # None, {} and () stand for keys and tables that are left out.
+        left_out = schema.get("default") in (None, {}, ())
         return self.generate_inner(schema["schema"]) if left_out else super().default_schema(schema)
 
     def field_title_should_be_set(self, schema: Any) -> bool:

@@ -117,7 +117,8 @@ class LateralTable(Table):
     """What all walls that are not named do to the fluid."""
 
     advice: ClassVar[Mapping[str, str]] = {
-        "pressure": "the lateral walls have none; give it wall by wall (x_min = ...)"
+        name: "the lateral walls have none; give it wall by wall (x_min = ...)"
+        for name in ("pressure", "inflow", "velocity")
     }
 
     slip: bool = key(
