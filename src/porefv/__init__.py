@@ -41,10 +41,11 @@ if TYPE_CHECKING:
     from porefv.conductance.model import ConductanceModel
     from porefv.conductance.section_friction.model import SectionFriction
     from porefv.errors import ComputationError, InputError, PorefvError
+    from porefv.flow.directional_permeabilities import directional_permeabilities
     from porefv.flow.fluid import Fluid
     from porefv.flow.flux import fluxes
     from porefv.flow.forces import Forces, grain_forces
-    from porefv.flow.inside import FixedPressure, Source
+    from porefv.flow.inside import FixedPressure, FlowSource
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
     from porefv.flow.pressure_on_grains import acting_pressure
@@ -66,6 +67,7 @@ _HOMES = {
     "EffectiveRadius": "porefv.conductance.effective_radius",
     "Facets": "porefv.mesh.facets",
     "FixedPressure": "porefv.flow.inside",
+    "FlowSource": "porefv.flow.inside",
     "Fluid": "porefv.flow.fluid",
     "Forces": "porefv.flow.forces",
     "HydraulicRadius": "porefv.conductance.hydraulic_radius",
@@ -78,13 +80,13 @@ _HOMES = {
     "PressureField": "porefv.flow.pressure",
     "RegularTriangulation": "porefv.tessellation.triangulation",
     "SectionFriction": "porefv.conductance.section_friction.model",
-    "Source": "porefv.flow.inside",
     "Sphere": "porefv.flow.regions",
     "Throats": "porefv.mesh.throats",
     "WALLS": "porefv.packing.box",
     "Wall": "porefv.flow.walls",
     "Walls": "porefv.flow.walls",
     "acting_pressure": "porefv.flow.pressure_on_grains",
+    "directional_permeabilities": "porefv.flow.directional_permeabilities",
     "fluxes": "porefv.flow.flux",
     "grain_forces": "porefv.flow.forces",
     "solve_pressure": "porefv.flow.pressure",
@@ -99,6 +101,7 @@ __all__ = [
     "EffectiveRadius",
     "Facets",
     "FixedPressure",
+    "FlowSource",
     "Fluid",
     "Forces",
     "HydraulicRadius",
@@ -111,12 +114,12 @@ __all__ = [
     "PressureField",
     "RegularTriangulation",
     "SectionFriction",
-    "Source",
     "Sphere",
     "Throats",
     "Wall",
     "Walls",
     "acting_pressure",
+    "directional_permeabilities",
     "fluxes",
     "grain_forces",
     "solve_pressure",

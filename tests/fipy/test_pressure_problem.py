@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.conductance.registry import MODELS
 from porefv.errors import InputError
-from porefv.flow.inside import FixedPressure, Source
+from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.regions import Point, Sphere
 from porefv.flow.walls import Wall, Walls
@@ -55,7 +55,7 @@ def test_isolated_pores_have_the_pressures_that_porefv_gives_them(overlap):
 def test_fipy_finds_the_same_pressures_with_sources_fixed_pressures_and_imposed_flows(mesh_of):
     flow = PoreFlow(
         mesh_of("n54_s1"), Walls(y_min=Wall(inflow=0.1), y_max=Wall(0.0)),
-        sources=[Source(Point([0.3, 0.5, 0.6]), 0.2), Source(Sphere([0.5, 0.5, 0.5], 0.3), -0.1)],
+        sources=[FlowSource(Point([0.3, 0.5, 0.6]), 0.2), FlowSource(Sphere([0.5, 0.5, 0.5], 0.3), -0.1)],
         fixed_pressures=[FixedPressure(Point([0.8, 0.4, 0.4]), 0.7)],
     )  # fmt: skip
     assert_allclose(flow.to_fipy().solve(), flow.pressure, rtol=0, atol=1e-9 * np.ptp(flow.pressure))

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from porefv.errors import ComputationError, InputError
-from porefv.flow.inside import FixedPressure, Source
+from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.regions import Point, Sphere, pore_at, pore_vertices, pores_in
 from porefv.flow.walls import Wall, Walls
@@ -26,7 +26,9 @@ def check_forces(flow):
     """The forces add up to those of the pressures on the open walls, also where fluid is injected."""
     forces = flow.forces
     assert forces.conservation_residual < 1e-12
-    total = forces.sums["pressure"] + forces.sums["viscous"] + forces.sums["wall_pressure"] + forces.sums["wall_viscous"]
+    total = (
+        forces.sums["pressure"] + forces.sums["viscous"] + forces.sums["wall_pressure"] + forces.sums["wall_viscous"]
+    )
     assert_allclose(total, forces.thrust, rtol=0, atol=1e-12 * forces.scale)
 
 
@@ -96,7 +98,7 @@ def test_a_box_and_a_sphere_stand_for_the_pores_whose_laguerre_vertices_they_con
 
 @pytest.mark.parametrize("region", [Point([0.4, 0.5, 0.6]), MIDDLE, Sphere([0.5, 0.5, 0.5], 0.3)])
 def test_what_a_source_injects_leaves_through_the_open_wall(mesh_of, region):
-    flow = PoreFlow(mesh_of("n200_s1"), OUTLET, sources=[Source(region, 1e-3)])
+    flow = PoreFlow(mesh_of("n200_s1"), OUTLET, sources=[FlowSource(region, 1e-3)])
     assert_allclose(flow.wall_flux["y_max"], -1e-3, rtol=1e-9)
     assert_allclose([flow.inflow, flow.outflow], 1e-3, rtol=1e-9)
     assert flow.imbalance < 1e-9 and flow.pressure.min() >= 0.0
@@ -105,7 +107,7 @@ def test_what_a_source_injects_leaves_through_the_open_wall(mesh_of, region):
 
 def test_a_source_is_divided_by_void_volume(mesh_of):
     mesh = mesh_of("n200_s1")
-    flow = PoreFlow(mesh, OUTLET, sources=[Source(MIDDLE, 2.0)])
+    flow = PoreFlow(mesh, OUTLET, sources=[FlowSource(MIDDLE, 2.0)])
     pores = pores_in(mesh, MIDDLE)
     volumes = mesh.pore_volumes[pores]
     assert_allclose(outflow_of_pores(flow)[pores], 2.0 * volumes / volumes.sum(), rtol=0, atol=1e-9)
@@ -113,13 +115,14 @@ def test_a_source_is_divided_by_void_volume(mesh_of):
 
 def test_flows_of_walls_and_sources_superpose(mesh_of):
     mesh = mesh_of("n200_s1")
-    sources = [Source(Point([0.2, 0.3, 0.4]), 0.2), Source(MIDDLE, -0.05)]
+    sources = [FlowSource(Point([0.2, 0.3, 0.4]), 0.2), FlowSource(MIDDLE, -0.05)]
     driven = PoreFlow(mesh, Walls.along("y"))
     fed = PoreFlow(mesh, Walls.along("y", 0.0), sources=sources)
     both = PoreFlow(mesh, Walls.along("y"), sources=sources)
     assert_allclose(both.pressure, driven.pressure + fed.pressure, rtol=0, atol=1e-9 * np.ptp(both.pressure))
     assert_allclose(both.forces.total, driven.forces.total + fed.forces.total, rtol=0, atol=1e-9 * both.forces.scale)
-    assert_allclose(both.pore_velocity, driven.pore_velocity + fed.pore_velocity, rtol=0, atol=1e-8 * np.abs(both.pore_velocity).max())  # fmt: skip
+    velocity = driven.pore_velocity + fed.pore_velocity
+    assert_allclose(both.pore_velocity, velocity, rtol=0, atol=1e-8 * np.abs(velocity).max())
     check_forces(both)
 
 
@@ -127,28 +130,28 @@ def test_a_source_in_a_pore_on_a_pressure_wall_leaves_through_the_wall(mesh_of):
     mesh = mesh_of("n25_s1")
     face = np.flatnonzero(mesh.wall_faces.walls == 3)[0]
     position = mesh.wall_faces.centroids[face] + mesh.triangulation.origin
-    flow = PoreFlow(mesh, OUTLET, sources=[Source(Point(position - [0, 1e-9, 0]), 0.5)])
+    flow = PoreFlow(mesh, OUTLET, sources=[FlowSource(Point(position - [0, 1e-9, 0]), 0.5)])
     assert_array_equal(flow.pressure, 0.0)
     assert flow.wall_flux["y_max"] == -0.5 and flow.imbalance == 0.0
 
 
 def test_a_source_and_an_imposed_flow_need_no_pressure_if_they_add_up_to_zero(mesh_of):
     mesh = mesh_of("n200_s1")
-    source = Source(Point([0.5, 0.5, 0.5]), 1e-3)
+    source = FlowSource(Point([0.5, 0.5, 0.5]), 1e-3)
     flow = PoreFlow(mesh, Walls(y_max=Wall(inflow=-1e-3)), sources=[source])
     plain = PoreFlow(mesh, OUTLET, sources=[source])
     assert_allclose(flow.pressure, plain.pressure, rtol=0, atol=1e-12 * np.ptp(plain.pressure))
     with pytest.raises(InputError, match="sum is 0.0005 m³/s instead of 0"):
         PoreFlow(mesh, Walls(y_max=Wall(inflow=-5e-4)), sources=[source])
     with pytest.raises(InputError, match="no wall has a pressure"):
-        PoreFlow(mesh, Walls(), sources=[source, Source(MIDDLE, -1e-3)])
+        PoreFlow(mesh, Walls(), sources=[source, FlowSource(MIDDLE, -1e-3)])
 
 
 def test_velocities_of_a_source_do_not_depend_on_where_the_box_stands(random_packing):
     packing = random_packing(60, seed=3, box=Box([0, 0, 0], [1, 1, 1]))
     moved = Packing(packing.centres + 64.0, packing.radii, Box([64, 64, 64], [65, 65, 65]))
-    here = PoreFlow(packing, OUTLET, sources=[Source(Point([0.5, 0.25, 0.5]), 1.0)])
-    there = PoreFlow(moved, OUTLET, sources=[Source(Point([64.5, 64.25, 64.5]), 1.0)])
+    here = PoreFlow(packing, OUTLET, sources=[FlowSource(Point([0.5, 0.25, 0.5]), 1.0)])
+    there = PoreFlow(moved, OUTLET, sources=[FlowSource(Point([64.5, 64.25, 64.5]), 1.0)])
     # Coordinates that are 64 times as large have 64 times the rounding.
     assert_allclose(there.pore_velocity, here.pore_velocity, rtol=0, atol=1e-9 * np.abs(here.pore_velocity).max())
 
@@ -160,7 +163,7 @@ def test_the_flow_of_a_fixed_pressure_imposed_as_a_source_gives_the_same_flow(me
     mesh, point = mesh_of("n200_s1"), Point([0.4, 0.5, 0.6])
     fixed = PoreFlow(mesh, OUTLET, fixed_pressures=[FixedPressure(point, 2.0)])
     (flow,) = fixed.fixed_pressure_flux
-    fed = PoreFlow(mesh, OUTLET, sources=[Source(point, flow)])
+    fed = PoreFlow(mesh, OUTLET, sources=[FlowSource(point, flow)])
     assert flow > 0.0
     assert_allclose(fed.pressure, fixed.pressure, rtol=0, atol=1e-9)
     assert_allclose(fed.wall_flux["y_max"], fixed.wall_flux["y_max"], rtol=1e-9)
@@ -196,7 +199,8 @@ def test_regions_alone_drive_a_flow_between_impervious_walls(mesh_of):
 def test_imposed_flow_and_regions_together(mesh_of):
     mesh = mesh_of("n200_s1")
     flow = PoreFlow(
-        mesh, Walls(y_min=Wall(inflow=0.1), y_max=Wall(inflow=-0.02)), sources=[Source(Point([0.7, 0.3, 0.5]), 0.05)],
+        mesh, Walls(y_min=Wall(inflow=0.1), y_max=Wall(inflow=-0.02)),
+        sources=[FlowSource(Point([0.7, 0.3, 0.5]), 0.05)],
         fixed_pressures=[FixedPressure(Point([0.2, 0.6, 0.5]), -3.0)],
     )  # fmt: skip
     assert_allclose(flow.fixed_pressure_flux, [-0.13], rtol=1e-8)
@@ -210,16 +214,19 @@ def test_imposed_flow_and_regions_together(mesh_of):
 @pytest.mark.parametrize(
     ("imposed", "said"),
     [
-        ({"sources": [Source(Point([2.0, 0.5, 0.5]), 1.0)]}, "the point 2, 0.5, 0.5 lies outside the box"),
-        ({"sources": [Source(Sphere([9.0, 0.5, 0.5], 0.1), 1.0)]}, "no pore has its Laguerre vertex in the sphere"),
+        ({"sources": [FlowSource(Point([2.0, 0.5, 0.5]), 1.0)]}, "the point 2, 0.5, 0.5 lies outside the box"),
+        ({"sources": [FlowSource(Sphere([9.0, 0.5, 0.5], 0.1), 1.0)]}, "no pore has its Laguerre vertex in the sphere"),
         ({"fixed_pressures": [FixedPressure(Box([0.5, 0.5, 0.5], [0.5001, 0.5001, 0.5001]), 1.0)]}, "in the box from"),
-        ({"sources": [FixedPressure(MIDDLE, 1.0)]}, "sources must be a list of Source"),
-        ({"sources": [Source("here", 1.0)]}, "a region must be a Point, a Sphere or a Box"),
+        ({"sources": [FixedPressure(MIDDLE, 1.0)]}, "sources must be a list of FlowSource"),
+        ({"sources": [FlowSource("here", 1.0)]}, "a region must be a Point, a Sphere or a Box"),
         (
             {"fixed_pressures": [FixedPressure(MIDDLE, 1.0), FixedPressure(Sphere([0.5, 0.5, 0.5], 0.4), 2.0)]},
             "two pressures",
         ),
-        ({"fixed_pressures": [FixedPressure(Box([0, 0.5, 0], [1, 1, 1]), 1.0)]}, "on y_max, which has the pressure 0 Pa"),
+        (
+            {"fixed_pressures": [FixedPressure(Box([0, 0.5, 0], [1, 1, 1]), 1.0)]},
+            "on y_max, which has the pressure 0 Pa",
+        ),
     ],
 )
 def test_regions_that_cannot_be_are_refused(mesh_of, imposed, said):
@@ -229,7 +236,7 @@ def test_regions_that_cannot_be_are_refused(mesh_of, imposed, said):
 
 def test_bad_values_are_refused():
     for make in (
-        lambda: Source(MIDDLE, float("nan")),
+        lambda: FlowSource(MIDDLE, float("nan")),
         lambda: FixedPressure(MIDDLE, "high"),
         lambda: Point([0.0, 1.0]),
         lambda: Sphere([0, 0, 0], 0.0),
@@ -242,13 +249,15 @@ def test_a_source_in_an_isolated_pore_is_refused_by_its_place():
     """Spheres of a simple cubic lattice at 1.42 times their touching radius close every throat between them."""
     centres = (np.stack(np.meshgrid(*[np.arange(3)] * 3), axis=-1).reshape(-1, 3) + 0.5) / 3
     mesh = PoreMesh(Packing(centres, np.full(27, 0.5 * 1.42 / 3), Box([0, 0, 0], [1, 1, 1])), wall_tolerance=0.5)
-    flow = PoreFlow(mesh, OUTLET, sources=[Source(Point([1 / 3, 1 / 3, 1 / 3]), 1.0)])
-    with pytest.raises(ComputationError, match=r"pore \d+ at 0.333333333, 0.333333333, 0.333333333 m has a source of 1 m³/s"):
+    flow = PoreFlow(mesh, OUTLET, sources=[FlowSource(Point([1 / 3, 1 / 3, 1 / 3]), 1.0)])
+    with pytest.raises(
+        ComputationError, match=r"pore \d+ at 0.333333333, 0.333333333, 0.333333333 m has a source of 1 m³/s"
+    ):
         _ = flow.pressure
 
 
 def test_permeability_is_refused_where_regions_drive_the_flow(mesh_of):
-    flow = PoreFlow(mesh_of("n25_s1"), Walls.along("y"), sources=[Source(Point([0.5, 0.5, 0.5]), 1.0)])
+    flow = PoreFlow(mesh_of("n25_s1"), Walls.along("y"), sources=[FlowSource(Point([0.5, 0.5, 0.5]), 1.0)])
     with pytest.raises(InputError, match="without sources and fixed pressures"):
         _ = flow.permeability
     assert "1 source" in repr(flow) and list(flow.wall_flux) == list(WALLS)

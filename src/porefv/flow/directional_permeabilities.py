@@ -86,7 +86,8 @@ def directional_permeabilities(
         through = wall_fluxes(mesh, wall_face_fluxes(mesh, outflows, walls.held))[2 * axis : 2 * axis + 2]
         flux = 0.5 * (max(through[0], 0.0) + max(-through[1], 0.0))
         found.append(float(fluid.viscosity * flux * mesh.box.size[axis] / mesh.box.section(axis)))
-    return DirectionalPermeabilities(*found, slip=bool(slip))
+    x, y, z = found
+    return DirectionalPermeabilities(x, y, z, bool(slip))
 
 
 def slip_of_impervious_walls(walls: Walls) -> bool:

@@ -75,7 +75,8 @@ def solve_imposed_flow(
 
     Examples
     --------
-    >>> mesh, walls = PoreMesh(Packing.read("data/packings/n25_s1.csv")), Walls(y_min=Wall(inflow=1e-3), y_max=Wall(0.0))
+    >>> mesh = PoreMesh(Packing.read("data/packings/n25_s1.csv"))
+    >>> walls = Walls(y_min=Wall(inflow=1e-3), y_max=Wall(pressure=0.0))
     >>> conductances = throat_conductances(mesh, SectionFriction(), walls.slip, viscosity=1e-3)
     >>> found = solve_imposed_flow(mesh, conductances, walls)
     >>> print(f"{found.walls.y_min.pressure:.3g} Pa")

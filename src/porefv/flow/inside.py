@@ -19,7 +19,7 @@ FLOW_BALANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Source:
+class FlowSource:
     """A flow into the pores of a region, divided among them in proportion to their void volumes.
 
     Parameters
@@ -74,22 +74,22 @@ class ImposedInside:
 
 
 def _check_size(value: float, name: str, unit: str) -> None:
-    check_number(
-        value, name, f"0 or of size {LEAST:g} to {MOST:g} {unit}", lambda x: x == 0.0 or within_range(abs(x))
-    )
+    check_number(value, name, f"0 or of size {LEAST:g} to {MOST:g} {unit}", lambda x: x == 0.0 or within_range(abs(x)))
 
 
-def check_imposed(walls: Walls, box: Box, sources: Sequence[Source], fixed_pressures: Sequence[FixedPressure]) -> None:
+def check_imposed(
+    walls: Walls, box: Box, sources: Sequence[FlowSource], fixed_pressures: Sequence[FixedPressure]
+) -> None:
     """InputError if what is imposed on walls and regions contradicts itself, or leaves the pressure open.
 
     Parameters
     ----------
     walls : Walls
     box : Box
-    sources : sequence of Source
+    sources : sequence of FlowSource
     fixed_pressures : sequence of FixedPressure
     """
-    for kind, given, name in ((Source, sources, "sources"), (FixedPressure, fixed_pressures, "fixed_pressures")):
+    for kind, given, name in ((FlowSource, sources, "sources"), (FixedPressure, fixed_pressures, "fixed_pressures")):
         for item in given:
             if not isinstance(item, kind):
                 raise InputError(f"{name} must be a list of {kind.__name__}, not of {item!r}")
@@ -101,13 +101,13 @@ def check_imposed(walls: Walls, box: Box, sources: Sequence[Source], fixed_press
     flows = [*walls.imposed_flows(box)[walls.imposes_flow], *(source.flow for source in sources)]
     if abs(sum(flows)) > FLOW_BALANCE * max(map(abs, flows)):
         raise InputError(
-            f"only flows are imposed, and their sum is {sum(flows):.6g} m³/s instead of 0: as much must leave as enters. "
-            "Change one of them, or give a wall a pressure, through which the rest leaves"
+            f"only flows are imposed, and their sum is {sum(flows):.6g} m³/s instead of 0: as much must leave as "
+            "enters. Change one of them, or give a wall a pressure, through which the rest leaves"
         )
 
 
 def imposed_inside(
-    mesh: PoreMesh, walls: Walls, sources: Sequence[Source], fixed_pressures: Sequence[FixedPressure]
+    mesh: PoreMesh, walls: Walls, sources: Sequence[FlowSource], fixed_pressures: Sequence[FixedPressure]
 ) -> ImposedInside:
     """What sources and fixed pressures impose on each pore.
 
@@ -115,7 +115,7 @@ def imposed_inside(
     ----------
     mesh : PoreMesh
     walls : Walls
-    sources : sequence of Source
+    sources : sequence of FlowSource
     fixed_pressures : sequence of FixedPressure
 
     Raises
@@ -135,7 +135,9 @@ def imposed_inside(
         other = pores[(number[pores] >= 0) & (pressures[pores] != fixed.pressure)]
         if len(other):
             first = region_text(fixed_pressures[number[other[0]]].region)
-            raise InputError(f"pore {other[0]} lies in {first} and in {region_text(fixed.region)}: it has two pressures")
+            raise InputError(
+                f"pore {other[0]} lies in {first} and in {region_text(fixed.region)}: it has two pressures"
+            )
         new = pores[number[pores] < 0]
         number[new], pressures[new] = k, fixed.pressure
     _refuse_pores_on_walls(mesh, walls, pressures, fixed_pressures, number)
@@ -170,6 +172,6 @@ def refuse_sources_without_outlet(mesh: PoreMesh, sources: np.ndarray, connected
     if len(wrong):
         pore = int(wrong[0])
         raise ComputationError(
-            f"pore {pore} at {vector(pore_vertices(mesh)[pore])} m has a source of {sources[pore]:.6g} m³/s, and no open "
-            "path leads from it to an imposed pressure"
+            f"pore {pore} at {vector(pore_vertices(mesh)[pore])} m has a source of {sources[pore]:.6g} m³/s, and no "
+            "open path leads from it to an imposed pressure"
         )

@@ -22,7 +22,7 @@ from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes, wall_fluxes
 from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.given_pressure import given_pressure
 from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
-from porefv.flow.inside import FixedPressure, ImposedInside, Source, check_imposed, imposed_inside
+from porefv.flow.inside import FixedPressure, FlowSource, ImposedInside, check_imposed, imposed_inside
 from porefv.flow.pressure import (
     PressureField,
     held_pressures,
@@ -63,7 +63,7 @@ class PoreFlow(FixedInputs):
         `SectionFriction()` by default; `HydraulicRadius()` is the model of C12.
     gravity : (3,) sequence of float
         Acceleration of gravity, for buoyancy [m/s²].
-    sources : sequence of Source
+    sources : sequence of FlowSource
         Flows into regions of the packing.
     fixed_pressures : sequence of FixedPressure
         Pressures of regions of the packing.
@@ -85,7 +85,7 @@ class PoreFlow(FixedInputs):
         conductance: ConductanceModel | None = None,
         *,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
-        sources: Sequence[Source] = (),
+        sources: Sequence[FlowSource] = (),
         fixed_pressures: Sequence[FixedPressure] = (),
         solver: str = "auto",
         tolerance: float = TOLERANCE,
@@ -122,7 +122,7 @@ class PoreFlow(FixedInputs):
         conductance: ConductanceModel | None = None,
         *,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
-        sources: Sequence[Source] = (),
+        sources: Sequence[FlowSource] = (),
         fixed_pressures: Sequence[FixedPressure] = (),
     ) -> PoreFlow:
         """The flow of a pressure found elsewhere, for instance by FiPy: its fluxes, forces and files.
@@ -379,7 +379,9 @@ class PoreFlow(FixedInputs):
         """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
         injected = None
         if self._inside is not None:  # all that does not come through a wall
-            through_walls = np.bincount(self.mesh.cell_pore[self.mesh.wall_faces.cells], self._face_flux, self.mesh.n_pores)
+            through_walls = np.bincount(
+                self.mesh.cell_pore[self.mesh.wall_faces.cells], self._face_flux, self.mesh.n_pores
+            )
             injected = net_outflows(self.mesh, self.flux) - through_walls
         velocities = pore_velocities(self.mesh, self.flux, self._face_flux, injected)
         return ensure_finite(velocities, "velocities")

@@ -7,7 +7,9 @@ import numpy as np
 from porefv.mesh.pore_mesh import PoreMesh
 
 
-def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, injected: np.ndarray | None = None) -> np.ndarray:
+def pore_velocities(
+    mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, injected: np.ndarray | None = None
+) -> np.ndarray:
     """Mean velocity of each pore, V u = ∫ u dV = ∮ x (u·n) dS - ∫ x (∇·u) dV.
 
     Each throat's flux is taken to pass at the centroid of its facet, each wall face's at its own. What is injected
@@ -43,8 +45,8 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, inj
         )
         if injected is not None:
             weighted = throats.areas * centres[:, axis]
-            moments[:, axis] -= injected * _by_pore(mesh, weighted) / np.maximum(
-                _by_pore(mesh, throats.areas), np.finfo(float).tiny
+            moments[:, axis] -= (
+                injected * _by_pore(mesh, weighted) / np.maximum(_by_pore(mesh, throats.areas), np.finfo(float).tiny)
             )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)

@@ -1,4 +1,4 @@
-"""What each wall of the box does to the fluid: it has a pressure, a flow or neither, and drags the fluid or does not."""
+"""What each wall of the box does to the fluid: it imposes a pressure, a flow or neither, and drags it or not."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.packing.box import WALLS, Box
 from porefv.system.number_checks import LEAST, MOST, is_finite_number, within_range
-
 
 # What can be imposed on a wall: the name, the unit in words, the unit.
 _IMPOSED = (

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from porefv.mesh.pore_mesh import PoreMesh
 
 UNITS = {
-    "permeability": "m2", "permeabilities": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
-    "wall_flux": "m3/s", "wall_pressure": "Pa", "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
+    "permeability": "m2", "permeabilities": "m2",
+    "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
+    "wall_flux": "m3/s", "wall_pressure": "Pa",
+    "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
 }  # fmt: skip
 

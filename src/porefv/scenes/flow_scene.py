@@ -16,7 +16,7 @@ from porefv.flow.directional_permeabilities import (
     slip_of_impervious_walls,
 )
 from porefv.flow.fluid import Fluid
-from porefv.flow.inside import FixedPressure, Source
+from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
@@ -127,8 +127,8 @@ class FlowOutput(Table):
     )
     quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
         'what is computed: any of `"permeability"`, `"permeabilities"` (along x, y and z, see '
-        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`. An empty list computes the '
-        "pores alone",
+        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`. An empty list '
+        "computes the pores alone",
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
@@ -149,7 +149,7 @@ class FlowScene(Scene):
         None: the box is in the packing file.
     fluid : Fluid
     walls : Walls
-    sources : tuple of Source
+    sources : tuple of FlowSource
     pressures : tuple of FixedPressure
     mesh : MeshOptions
     flow : FlowOptions
@@ -169,7 +169,7 @@ class FlowScene(Scene):
     )
     fluid: Annotated[Fluid, MadeFrom(FluidTable)] = key("the table `[fluid]`: what fills the pores", {})
     walls: Annotated[Walls, MadeFrom(WallsTable)] = key("the table `[walls]`: what the walls do to the fluid", {})
-    sources: Annotated[tuple[Annotated[Source, MadeFrom(SourceTable)], ...], Field(strict=False)] = key(
+    sources: Annotated[tuple[Annotated[FlowSource, MadeFrom(SourceTable)], ...], Field(strict=False)] = key(
         "a table `[[sources]]` for each flow into a region of the packing", (), shown="none"
     )
     pressures: Annotated[tuple[Annotated[FixedPressure, MadeFrom(FixedPressureTable)], ...], Field(strict=False)] = key(
@@ -260,7 +260,7 @@ class FlowScene(Scene):
             raise InputError(f"{self.path or 'scene'}: {error}") from None
 
     def permeabilities(self, mesh: PoreMesh | None = None) -> DirectionalPermeabilities:
-        """Permeabilities along all axes; the walls beside the flow slip as those of the scene that fluid does not pass."""
+        """Permeabilities along all axes, with the slip of the scene's walls that fluid does not pass."""
         return directional_permeabilities(
             self.pore_mesh() if mesh is None else mesh, self.fluid, self.flow.conductance,
             slip=slip_of_impervious_walls(self.walls), solver=self.flow.solver, tolerance=self.flow.tolerance,
@@ -298,7 +298,8 @@ class FlowScene(Scene):
             flow = self.pore_flow(mesh) if self.driven else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
-                progress=progress, permeabilities=lambda: self.permeabilities(mesh), scene=str(self.path) if self.path else None, packing=str(self.packing.file),
+                progress=progress, permeabilities=lambda: self.permeabilities(mesh),
+                scene=str(self.path) if self.path else None, packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from porefv.flow.inside import FixedPressure, Source
+from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.regions import Point, Region, Sphere
 from porefv.packing.box import Box
 from porefv.scenes.errors import refused
@@ -65,8 +65,8 @@ class SourceTable(RegionTable):
 
     flow: float = key("flow into the sample. A negative one leaves it", unit="m³/s")
 
-    def make(self) -> Source:
-        return Source(self.region(), self.flow)
+    def make(self) -> FlowSource:
+        return FlowSource(self.region(), self.flow)
 
 
 class FixedPressureTable(RegionTable):

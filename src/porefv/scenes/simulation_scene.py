@@ -45,7 +45,9 @@ class ScaledPackingFile(PackingFile):
     """The packing file, and the unit of its lengths."""
 
     scale: Annotated[float, Limits("must be a positive number of m", above=0.0)] = key(
-        "factor by which lengths in the file, its box included, are multiplied to be in m", 1.0
+        "unit of lengths in the file, its box included: the factor by which they are multiplied to be in m",
+        1.0,
+        unit="m",
     )
 
 
