@@ -17,8 +17,6 @@ from porefv.scenes.packing_scene import PackingScene
 from porefv.scenes.schema import KINDS, json_schema
 from porefv.scenes.simulation_scene import SimulationScene
 
-pytest.importorskip("pint")
-
 DATA = Path(__file__).parents[2] / "data"
 PACKING = (DATA / "packings" / "n25_s1.csv").as_posix()
 # A unit of each dimension of keys, and what it is in the unit of the key.

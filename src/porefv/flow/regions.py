@@ -123,7 +123,7 @@ def pore_at(mesh: PoreMesh, position: np.ndarray) -> int:
     # Cells are convex: a point is in the cell whose facets it is all behind.
     facets = mesh.facets
     local = position - mesh.triangulation.origin
-    beyond = np.einsum("fa,fa->f", facets.normals, local - facets.centroids)
+    beyond = np.nan_to_num(np.einsum("fa,fa->f", facets.normals, local - facets.centroids))  # of facets without area
     farthest = np.full(mesh.n_cells, -np.inf)
     np.maximum.at(farthest, facets.cells[:, 0], beyond)
     np.maximum.at(farthest, facets.cells[:, 1], -beyond)
