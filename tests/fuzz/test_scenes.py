@@ -56,10 +56,10 @@ x_max = { velocity = "-1 mm/s" }
 point = [0.5, 0.5, 0.5]
 flow = 1.0e-3
 [[sources]]
-box = { lower = [0.0, 0.0, 0.0], upper = [1.0, 1.0, 0.9] }
+box = { lower = [-1.0, -1.0, -1.0], upper = [2.0, 2.0, 2.0] }
 flow = "-1 L/s"
 [[pressures]]
-sphere = { centre = [0.5, 0.4, 0.5], radius = 0.2 }
+sphere = { centre = [0.1, 0.3, 1.0], radius = "200 mm" }
 pressure = "1 kPa"
 [output]
 quantities = ["permeabilities", "pressure", "forces"]
