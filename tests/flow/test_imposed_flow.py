@@ -155,3 +155,10 @@ def test_a_flow_into_a_closed_packing_is_refused_by_the_name_of_the_wall():
     mesh = PoreMesh(packing, wall_tolerance=0.5)
     with pytest.raises(ComputationError, match="no open path leads from y_min"):
         _ = PoreFlow(mesh, Walls(y_min=Wall(inflow=1.0), y_max=Wall(0.0))).pressure
+
+
+def test_a_flow_that_is_much_smaller_than_others_is_found_as_exactly(mesh_of):
+    walls = Walls(x_min=Wall(1e6), x_max=Wall(0.0), y_min=Wall(inflow=1e-4))
+    flow = PoreFlow(mesh_of("n54_s1"), walls, Fluid(viscosity=1e-3))
+    assert flow.inflow > 1e8 * 1e-4
+    assert_allclose(flow.wall_flux["y_min"], 1e-4, rtol=1e-4)  # 12 digits less than those of the largest flow

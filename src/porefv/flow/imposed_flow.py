@@ -15,9 +15,10 @@ from porefv.packing.box import WALLS
 from porefv.solvers.pressure_equation import reached
 from porefv.solvers.solver import TOLERANCE
 
-# Corrections of the pressures. After the first the error is that of the solver, so that one or two are enough.
-CORRECTIONS = 5
-# How far the flow through a wall may be from the imposed one: tolerances of the solver, relative to the largest flow.
+# Solutions at corrected pressures, at most. Two are usual: the error of each correction is that of the solver.
+CORRECTIONS = 6
+# How far the flow through a wall may be from the imposed one: tolerances of the solver, relative to that flow, or to
+# the largest flow where corrections do not help any more.
 SHORT = 10.0
 
 
@@ -114,18 +115,22 @@ def solve_imposed_flow(
         one = base.copy()
         one[wall] = 1.0
         columns[:, j] = solve(one, unit=True)[1][unknown]
-    for correction in range(CORRECTIONS):
+    asked, before = flows[unknown], np.inf
+    for _ in range(CORRECTIONS):
         field, through = solve(found)
-        short = flows[unknown] - through[unknown]
-        size = max(np.abs(through).max(), np.abs(flows[unknown]).max(initial=0.0))
-        if len(unknown) == 0 or (correction > 0 and np.abs(short).max() <= SHORT * tolerance * size):
+        short = asked - through[unknown]
+        missing = float(np.abs(short).max(initial=0.0))
+        size = max(np.abs(through).max(), np.abs(asked).max(initial=0.0))
+        exact = np.abs(short) <= SHORT * tolerance * np.where(asked != 0.0, np.abs(asked), size)
+        if exact.all() or missing > 0.5 * before:
             break
+        before = missing
         found[unknown] += np.linalg.solve(columns, short)
-    else:
+    if missing > SHORT * tolerance * size:
         worst = int(unknown[np.argmax(np.abs(short))])
         raise ComputationError(
-            f"the flow through {WALLS[worst]} is {through[worst]:.6g} m³/s instead of {flows[worst]:.6g} m³/s after "
-            f"{CORRECTIONS} corrections of its pressure; try a smaller tolerance, or solver = 'direct'"
+            f"the flow through {WALLS[worst]} is {through[worst]:.6g} m³/s instead of {flows[worst]:.6g} m³/s, and "
+            "correcting its pressure does not help; try a smaller tolerance, or solver = 'direct'"
         )
     lowest = reference_pressure(walls.with_pressures(found), inside)
     return FlowAtWalls(
