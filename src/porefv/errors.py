@@ -81,8 +81,16 @@ class CompilationWarning(PorefvWarning):
     """Compiled kernels cannot be kept: they are compiled anew in every process."""
 
 
+class PackingFileWarning(PorefvWarning):
+    """Something in a packing file was not read, or was read in a way that the user may not expect."""
+
+
 class ImbalanceWarning(PorefvWarning):
     """A pressure that was found elsewhere leaves more of the flow out of balance than rounding explains."""
+
+
+class OutOfRangeWarning(PorefvWarning):
+    """Much of a flow is in throats of a kind that the conductance model was not tested on."""
 
 
 def vector(values: Iterable[float]) -> str:

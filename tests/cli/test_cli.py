@@ -61,6 +61,7 @@ def test_check_tells_what_was_found_and_writes_nothing(scene, capsys):
     assert "scene.toml has no errors" in out
     assert "25 spheres, radii 0.111 to 0.2078 m" in out
     assert "y_min: 1 Pa, no-slip" in out
+    assert "table with header, separated by commas; no unit stated, taken as m; columns x, y, z, radius" in out
     assert "--force" not in out
     assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
 
@@ -269,12 +270,16 @@ def test_sigterm_is_status_143_and_nothing_is_left(scene, capsys, monkeypatch):
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_a_signal_that_comes_within_a_kernel_is_a_signal(scene, monkeypatch):
+def test_a_signal_that_a_library_turns_into_an_error_is_a_signal(scene, monkeypatch):
     def interrupted(*arguments):
-        raise SystemError("a result with an exception set") from KeyboardInterrupt()
+        try:
+            signal.raise_signal(number)
+        except BaseException:
+            raise ImportError("a library is half loaded") from None
 
     monkeypatch.setattr(FlowScene, "pore_flow", interrupted)
-    assert main(["solve", str(scene)]) == 130
+    for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):  # noqa: B007
+        assert main(["solve", str(scene)]) == status
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full")
@@ -353,3 +358,38 @@ def test_a_tilde_is_the_home_directory(scene, monkeypatch, capsys):
     scene.write_text(scene.read_text().replace("~/", "~nobody_of_this_name/"))
     assert main(["solve", str(scene)]) == 2
     assert "the home directory in '~nobody_of_this_name/results' is not known" in capsys.readouterr().err
+
+
+def test_a_path_with_a_line_break_is_refused(scene, capsys):
+    assert main(["info", f"{scene.parent}\nporefv: done"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    scene.write_text(scene.read_text() + 'directory = "x\\ny"\n')
+    assert main(["solve", str(scene)]) == 2
+    assert "a line break stands in 'x\\ny'" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a device without an end")
+def test_a_scene_has_an_end(capsys):
+    assert main(["solve", "/dev/zero"]) == 2
+    assert "more than 64 MiB" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of bytes")
+def test_names_that_are_no_text(scene, capsys):
+    folder = scene.parent / os.fsdecode(b"d\xff")
+    folder.mkdir()
+    (folder / "scene.toml").write_text(scene.read_text())
+    assert main(["solve", str(folder / "scene.toml")]) == 0
+    assert main(["info", str(folder / "results")]) == 0
+    assert r"d\udcff" in capsys.readouterr().out
+
+
+def test_numbers_of_a_summary_may_be_of_any_size(scene, capsys):
+    main(["solve", str(scene), "--quiet"])
+    path = scene.parent / "results" / "summary.json"
+    for old in ("porosity", "inflow", "viscosity", "total"):
+        summary = path.read_text()
+        path.write_text(re.sub(rf'"{old}": [^,\n]+', f'"{old}": {10**400}', summary))
+        assert main(["info", str(path.parent)]) in (0, 2)
+        assert "defect" not in capsys.readouterr().err
+        path.write_text(summary)

@@ -274,6 +274,11 @@ def test_a_checkpoint_of_grains_alone_is_not_one_of_a_coupling(coupled, tmp_path
         (lambda header, content: content["mesh_centres"].put(0, np.inf), "mesh_centres is not finite"),
         (lambda header, content: content["mesh_radii"].put(0, -1.0), "radi"),
         (lambda header, content: content["dem_pairs_others"].put(0, 2**30), "pairs_others are not those of pairs"),
+        (lambda header, content: header["effort"].update(steps=None), "steps, iterations and meshes are counts"),
+        (lambda header, content: header["effort"].update(seconds="long"), "the seconds are of"),
+        (lambda header, content: header["effort"]["seconds"].update(forces=10**400), "the seconds are no numbers"),
+        (lambda header, content: header.update(walls=3), "damaged"),
+        (lambda header, content: header.update(conductance={}), "'name' is missing"),
         (lambda header, content: content.pop("dem_pairs_shear"), r"porefv\.dem.*'pairs_shear' is missing"),
     ],
 )

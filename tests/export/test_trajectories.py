@@ -262,3 +262,30 @@ print([name for name in ("pyvista", "vtkmodules") if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_frames_are_read_back_with_the_box_that_they_had(tmp_path):
+    dem = sample()
+    trajectory = Trajectory(tmp_path, dem)
+    packings = []
+    for _ in range(3):
+        dem.run(10)
+        trajectory.write()
+        packings.append(dem.packing)
+    assert not np.array_equal(packings[0].box.upper, packings[2].box.upper)  # a plate presses
+    for frame, expected in ((0, packings[0]), (1, packings[1]), (None, packings[2])):
+        found = Packing.read(tmp_path / "grains.pvd", frame=frame)
+        assert_array_equal(found.centres, expected.centres)
+        assert_array_equal(found.radii, expected.radii)
+        assert_array_equal(found.box.lower, expected.box.lower)
+        assert_array_equal(found.box.upper, expected.box.upper)
+    assert found.reading.frames == 3 and found.reading.frame == 2
+    file = next(tmp_path.glob("grains_*10.vtp"))
+    assert_array_equal(Packing.read(file).centres, packings[0].centres)
+    with pytest.raises(InputError, match=r"walls.pvd: its frame 2 cannot be read: .*there is no radius"):
+        Packing.read(tmp_path / "walls.pvd")
+    file.unlink()
+    with pytest.raises(InputError, match=r"grains.pvd: its frame 0 cannot be read: .*there is no such file"):
+        Packing.read(tmp_path / "grains.pvd", frame=0)
+    with pytest.raises(InputError, match="3 frames, 0 to 2"):
+        Packing.read(tmp_path / "grains.pvd", frame=3)

@@ -213,7 +213,7 @@ def test_trade(survives, old, monkeypatch):
     def prepare(folder):
         put(old, folder, "scene.toml")
         (folder / "trade").mkdir()
-        (folder / "trade" / "summary.json").write_text("{}")
+        (folder / "trade" / "summary.json").write_text('{"kind": "trade"}')
 
     def check(folder):
         put_back("trade")

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from porefv.errors import ComputationError, InputError
 from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.regions import Point, Sphere, pore_at, pore_vertices, pores_in
+from porefv.flow.regions import Point, Sphere, pore_at, pores_in
 from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
@@ -80,13 +80,13 @@ def test_a_point_in_a_grain_stands_for_the_pore_of_the_nearest_laguerre_vertex(m
     mesh = mesh_of("n25_s1")
     centre = mesh.packing.centres[3]
     (pore,) = pores_in(mesh, Point(centre))
-    distances = np.linalg.norm(pore_vertices(mesh) - centre, axis=1)
+    distances = np.linalg.norm(mesh.pore_points - centre, axis=1)
     assert distances[pore] == distances.min()
 
 
 def test_a_box_and_a_sphere_stand_for_the_pores_whose_laguerre_vertices_they_contain(mesh_of):
     mesh = mesh_of("n200_s1")
-    vertices = pore_vertices(mesh)
+    vertices = mesh.pore_points
     in_box = pores_in(mesh, MIDDLE)
     assert_array_equal(in_box, np.flatnonzero((np.abs(vertices - 0.5) <= 0.2).all(axis=1)))
     in_sphere = pores_in(mesh, Sphere([0.5, 0.5, 0.5], 0.2))
@@ -261,3 +261,14 @@ def test_permeability_is_refused_where_regions_drive_the_flow(mesh_of):
     with pytest.raises(InputError, match="without sources and fixed pressures"):
         _ = flow.permeability
     assert "1 source" in repr(flow) and list(flow.wall_flux) == list(WALLS)
+
+
+def test_quantities_of_the_sample_count_what_regions_inject(mesh_of):
+    mesh = mesh_of("n200_s1")
+    flow = PoreFlow(mesh, OUTLET, sources=[FlowSource(Point([0.4, 0.5, 0.6]), 1e-3)])
+    # Planes behind the source have its flow, those before it have none.
+    assert_allclose(flow.plane_fluxes([0.1, 0.9], "y"), [0.0, 1e-3], rtol=1e-9, atol=1e-12)
+    velocities = (flow.pore_velocity * mesh.pore_volumes[:, None]).sum(axis=0)
+    assert_allclose(flow.darcy_velocity, velocities / mesh.box.volume, rtol=1e-12)
+    with pytest.raises(InputError, match="no regions that drive"):
+        _ = PoreFlow(mesh, Walls.along("y"), sources=flow.sources).tortuosity

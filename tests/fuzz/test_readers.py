@@ -1,8 +1,11 @@
 """Damaged files of every kind: read, or refused in one line of words; never a crash, a hang or a traceback."""
 
 import contextlib
+import gzip
 import io
+import json
 import os
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +14,12 @@ from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from porefv import cli, results
-from porefv.errors import PorefvError
+from porefv.errors import PackingFileWarning, PorefvError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 from porefv.packing.box import Box
-from porefv.packing.files.registry import read_packing
+from porefv.packing.files.registry import FORMATS, read_packing
 from porefv.packing.packing import Packing
 
 FUZZ = settings.get_profile("fuzz-nightly" if os.environ.get("POREFV_FUZZ") == "nightly" else "fuzz")
@@ -52,6 +55,34 @@ ITEM: ATOMS id xs ys zs diameter
 2 0.25 0.25 0.25 0.3
 1 0.75 0.75 0.75 0.4
 """
+MERCURY = "2 0.5 0 0 0 1 1 1\n" + "0.25 0.25 0.25 0 0 0 0.2 0 0 0 0 0 0 0\n0.75 0.75 0.75 0 0 0 0.2 0 0 0 0 0 0 0\n"
+ESYS = """LSMGeometry 1.2
+BoundingBox 0 0 0 1 1 1
+PeriodicBoundaries 0 0 0
+Dimension 3D
+BeginParticles
+Simple
+2
+0.25 0.25 0.25 0.2 0 1
+0.75 0.75 0.75 0.2 1 1
+EndParticles
+"""
+XYZ = """2
+Lattice="1 0 0 0 1 0 0 0 1" Origin="0 0 0" pbc="F F F" Properties=species:S:1:pos:R:3:radius:R:1
+A 0.25 0.25 0.25 0.2
+A 0.75 0.75 0.75 0.2
+"""
+EDEM = """EXPORTED DATA
+TIME:,0.5,s
+
+Particle ID,Position X (mm),Position Y (mm),Position Z (mm),Diameter (mm)
+1,250,250,250,400
+2,750,750,750,400
+"""
+SPHERE_PACK = "0.25 0.25 0.25 0.2 -1\n0.75 0.75 0.75 0.2 -1\n"
+VORO = "1 0.25 0.25 0.25 0.2\n2 0.75 0.75 0.75 0.2\n"
+XYZD = np.array([[0.25, 0.25, 0.25, 0.4], [0.75, 0.75, 0.75, 0.4]], "<f8").tobytes()
+NFO = "N: 2\nDimensions: 1 1 1\nTheoretical Porosity: 0.9\nFinal Porosity: 0.9\n"
 LEGACY = """# vtk DataFile Version 3.0
 grains
 ASCII
@@ -98,13 +129,30 @@ def sound(folder):
         ".dump": LAMMPS_DUMP.encode(),
         ".vtk": LEGACY.encode(),
         ".bin.vtk": LEGACY_BINARY,
+        ".units.dump": (f"ITEM: UNITS\ncgs\n{LAMMPS_DUMP}ITEM: TIME\n1\n{LAMMPS_DUMP}").encode(),
+        ".mercury": MERCURY.encode() * 2,
+        ".geo": ESYS.encode(),
+        ".xyz": XYZ.encode() * 2,
+        ".edem.csv": EDEM.encode(),
+        ".pack.txt": SPHERE_PACK.encode(),
+        ".voro.txt": VORO.encode(),
+        ".xyzd": XYZD,
+        ".csv.gz": gzip.compress(written(folder, "a.csv")),
     }
+
+
+KINDS = (
+    ".csv", ".txt", ".lammps", ".dump", ".vtk", ".bin.vtk", ".units.dump", ".mercury", ".geo", ".xyz", ".edem.csv",
+    ".pack.txt", ".voro.txt", ".xyzd", ".csv.gz",
+)  # fmt: skip
 
 
 TEXTS = [
     b"nan", b"inf", b"-inf", b"1e999", b"-1", b"0", b"1e-320", b"99999999999999", b"1_0", b"\xef\xbb\xbf", b"\xc2\xa0",
     b"\x00", b"\xff", b"\r", b"\n", b",", b";", b"\t", b'"', b"#", b"# box_lower = 0 0 0\n", b"ITEM:", b"ITEM: ATOMS",
     b"ITEM: TIMESTEP\n", b"Atoms\n", b"POINTS", b"POINT_DATA 2\n", b"radius", b"BINARY", b"\xe2\x88\x92", b"\xd9\xa3",
+    b"ITEM: UNITS\nlj\n", b"(mm)", b"pp pp pp", b"##PERIODIC:: 1 1 1\n", b"PeriodicBoundaries 1 1 1\n", b"Properties=",
+    b":R:99999999999", b"BeginParticles\n", b"x y z r\n",
     b"",
 ]  # fmt: skip
 
@@ -124,7 +172,10 @@ def damaged(content: bytes, damage) -> bytes:
 def read(path: Path, format: str | None = None) -> str:
     """What becomes of a file."""
     try:
-        packing = read_packing(path, format)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PackingFileWarning)
+            packing = read_packing(path, format)
+        assert str(packing.reading) and json.dumps(packing.reading.as_data(), allow_nan=False)
         assert np.isfinite(packing.centres).all() and (packing.radii > 0).all()
         if packing.box is not None:
             packing.validate()
@@ -136,7 +187,7 @@ def read(path: Path, format: str | None = None) -> str:
 
 
 @settings(FUZZ)
-@given(kind=st.sampled_from([".csv", ".txt", ".lammps", ".dump", ".vtk", ".bin.vtk"]), damage=changes)
+@given(kind=st.sampled_from(KINDS), damage=changes)
 def test_a_damaged_packing_file_is_read_or_refused(folder, sound, kind, damage):
     path = folder / f"damaged{kind}"
     path.write_bytes(damaged(sound[kind], damage))
@@ -145,7 +196,7 @@ def test_a_damaged_packing_file_is_read_or_refused(folder, sound, kind, damage):
 
 @settings(FUZZ)
 @given(
-    format=st.sampled_from(["csv", "yade", "lammps", "vtk"]),
+    format=st.sampled_from([None, *FORMATS]),
     content=st.one_of(st.binary(max_size=200), st.text(max_size=200)),
 )
 @example(format="lammps", content="\ufeff \n\n")
@@ -154,6 +205,66 @@ def test_any_content_is_read_or_refused_in_any_format(folder, format, content):
     path = folder / "anything"
     path.write_bytes(content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content)
     event(f"{format} {read(path, format)}")
+
+
+@settings(FUZZ)
+@given(damage=changes)
+def test_a_damaged_nfo_file_is_read_or_refused(folder, damage):
+    path = folder / "with_nfo.xyzd"
+    path.write_bytes(XYZD)
+    path.with_suffix(".nfo").write_bytes(damaged(NFO.encode(), damage))
+    event(read(path))
+
+
+@settings(FUZZ)
+@given(
+    kind=st.sampled_from(KINDS),
+    options=st.fixed_dictionaries(
+        {},
+        optional={
+            "columns": st.dictionaries(
+                st.sampled_from(["x", "y", "z", "radius", "diameter"]),
+                st.sampled_from(["x", "1", "2", "4", "Diameter (mm)", "xs", "radius", ""]),
+            ),
+            "radius": st.sampled_from([0.1, 1e-300, 1e300]),
+            "scale": st.sampled_from([1e-3, 1e-300, 1e300]),
+            "frame": st.integers(-3, 3),
+            "periodic": st.just("ignore"),
+        },
+    ),
+)
+def test_any_options_read_a_sound_file_or_are_refused(folder, sound, kind, options):
+    path = folder / f"options{kind}"
+    path.write_bytes(sound[kind])
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PackingFileWarning)
+            packing = read_packing(path, **options)
+        assert np.isfinite(packing.centres).all() and (packing.radii > 0).all()
+        event(f"{kind} read")
+    except PorefvError as error:
+        assert str(path) in str(error)
+        event(f"{kind} refused")
+
+
+PVD = """<?xml version="1.0"?>
+<VTKFile type="Collection" version="0.1">
+<Collection>
+<DataSet timestep="0.0" part="0" file="frame.vtk"/>
+<DataSet timestep="1.0" part="0" file="frame.vtk"/>
+</Collection>
+</VTKFile>
+"""
+
+
+@settings(FUZZ)
+@given(damage=changes)
+@example(damage=[])
+def test_a_damaged_list_of_frames_is_read_or_refused(folder, damage):
+    (folder / "frame.vtk").write_text(LEGACY)
+    path = folder / "damaged.pvd"
+    path.write_bytes(damaged(PVD.encode(), damage))
+    event(read(path))
 
 
 # ---- results -------------------------------------------------------------------------------------------------

@@ -72,6 +72,22 @@ def test_summary_tells_stages_versions_walls_and_units(everything):
     assert summary["created"].endswith("+00:00")
 
 
+def test_summary_tells_how_the_packing_was_read(everything):
+    reading = everything.summary["packing"]["reading"]
+    assert reading["format"] == "table with header, separated by commas"
+    assert reading["scale"] == 1.0 and reading["units"] == "" and reading["periodicity"] == ""
+    assert reading["columns"] == {axis: axis for axis in ("x", "y", "z", "radius")}
+    assert reading["box"] == "comments box_lower, box_upper"
+
+
+def test_spheres_are_read_back_with_their_box_and_give_the_same_flow(flow, everything):
+    packing = Packing.read(everything.directory / "spheres.vtp")
+    np.testing.assert_array_equal(packing.centres, flow.mesh.packing.centres)
+    np.testing.assert_array_equal(packing.radii, flow.mesh.packing.radii)
+    np.testing.assert_array_equal(packing.box.upper, flow.mesh.box.upper)
+    assert PoreFlow(packing, flow.walls, flow.fluid).permeability == flow.permeability
+
+
 def test_summary_counts_unusual_throats(flow, everything):
     unusual = everything.summary["unusual"]
     assert unusual["closed_throats"] == flow.mesh.throats.closed.sum()
@@ -171,7 +187,7 @@ def test_only_what_was_asked_for_is_written(flow, tmp_path):
 def test_meshes_without_pressure_have_none(flow, tmp_path):
     pytest.importorskip("pyvista")
     found = results.read(results.write(flow, tmp_path / "k", quantities=["permeability"]))
-    assert set(found.pores.cell_data) == {"pore", "volume"}
+    assert set(found.pores.cell_data) == {"pore", "volume", "walls"}
     assert set(found.spheres.point_data) == {"id", "radius"}
 
 

@@ -210,7 +210,7 @@ BAD = {
     "unknown key of a wall": ("pressure = 1", "presure = 1", "line 5: .walls.y_min. unknown key 'presure'"),
     "unknown solver": ('"auto"', '"dirct"', "line 8: .flow. solver: unknown solver 'dirct'; did"),
     "unknown model": ('solver = "auto"', 'conductance = "square"', "unknown conductance 'square'; known"),
-    "unknown quantity": ('"permeability"', '"velocity"', "line 10: .output. quantities: 'velocity'"),
+    "unknown quantity": ('"permeability"', '"vorticity"', "line 10: .output. quantities: 'vorticity'"),
     "quantities not a list": ('["permeability"]', '"permeability"', "expected a list"),
     "no viscosity": ("1.0e-3", "0.0", "line 3: .fluid. viscosity must be a positive"),
     "negative viscosity": ("1.0e-3", "-1", "viscosity must be a positive"),
@@ -310,7 +310,9 @@ def test_scene_that_cannot_be_read_is_refused(tmp_path):
 def test_packing_without_box_tells_how_to_give_one(tmp_path):
     (tmp_path / "bare.csv").write_text("x,y,z,radius\n0.5,0.5,0.5,0.4\n")
     scene = FlowScene.from_mapping(mapping(packing="bare.csv"), directory=tmp_path)
-    with pytest.raises(InputError, match=r"bare.csv holds no box; give one in the scene:\n\[box\]"):
+    with pytest.raises(
+        InputError, match=r"(?s)bare.csv holds no box.*\[box\]\nlower = \[0.1, 0.1, 0.1\]\nupper = \[0.9, "
+    ):
         scene.check()
 
 
@@ -344,3 +346,29 @@ def test_lines_of_keys_are_found_in_any_spelling():
     assert line_of(text, "t", "e") == 5
     assert line_of(text, "g.h", "i") == 8
     assert line_of(text, "", "nowhere") is None
+
+
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ({"quantities": ["tortuosity"]}, "tortuosity needs exactly two pressure walls"),
+        ({"quantities": ["profile"]}, "profile needs an axis"),
+        ({"quantities": ["planes"]}, "planes needs an axis"),
+        ({"layers": 0}, "layers: expected a whole number, 1 or more"),
+        ({"axis": "w"}, "axis"),
+        ({"planes": 0.5}, "planes: expected a list of finite numbers"),
+    ],
+)
+def test_quantities_of_the_sample_need_an_axis_and_sound_keys(output, message):
+    walls = {"y_min": {"pressure": 1.0}, "x_max": {"pressure": 0.0}}
+    with pytest.raises(InputError, match=message):
+        FlowScene.from_mapping(
+            mapping(walls=walls, output={"quantities": ["pressure"]} | output), directory=DATA / "packings"
+        )
+
+
+def test_check_finds_planes_outside_the_box(tmp_path):
+    output = {"directory": str(tmp_path / "results"), "quantities": ["planes"], "planes": [2.0]}
+    scene = FlowScene.from_mapping(mapping(output=output), directory=DATA / "packings")
+    with pytest.raises(InputError, match="planes must lie inside the box, between 0 and 1 m along y: 2 m does not"):
+        scene.check()

@@ -13,7 +13,7 @@ from porefv.dem.dem import DEM
 from porefv.simulation.run_record import RunRecord, StageSpan, read_record
 from porefv.simulation.series import SERIES, SeriesMark
 
-MARKS = {SERIES: SeriesMark(0)}
+MARKS = {SERIES: SeriesMark(0, "e3b0")}
 
 
 def record_of(dem):

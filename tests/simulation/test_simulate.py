@@ -367,6 +367,50 @@ def test_results_are_replaced_by_force_only_and_other_files_never(path, capsys, 
     assert "holds files that are not results of porefv simulate" in capsys.readouterr().err
 
 
+def test_what_is_not_of_a_run_is_not_removed(path, tmp_path, capsys):
+    path.write_text(DRY.replace("0.02", "0.001"))
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "simulation.json").write_text('{"mine": 1}')
+    (tmp_path / "results" / "series.csv").write_text("mine")
+    for option in ("--force", "--resume"):
+        assert main(["simulate", str(path), option]) == 2
+    assert (tmp_path / "results" / "series.csv").read_text() == "mine"
+    shutil.rmtree(tmp_path / "results")
+    found = run(path, path.read_text())
+    before = (found / "simulation.json").read_bytes()
+    (tmp_path / "others").mkdir()
+    (tmp_path / "others" / "grains_1.vtp").write_text("mine")
+    (found / "frames").symlink_to("../others")
+    assert main(["simulate", str(path), "--force"]) == 2
+    assert "frames: it is a link" in capsys.readouterr().err
+    (found / "frames").unlink()
+    (found / "frames" / "grains_1.vtp").mkdir(parents=True)
+    assert main(["simulate", str(path), "--force"]) == 2
+    assert "grains_1.vtp: it is a directory" in capsys.readouterr().err
+    assert (found / "simulation.json").read_bytes() == before
+    assert (tmp_path / "others" / "grains_1.vtp").read_text() == "mine"
+
+
+def test_names_of_stages_are_no_formulas(path):
+    text = DRY.replace("0.02", "0.001").replace('"press"', "'$\\frac{$x'")
+    assert main(["plot", str(run(path, text)), "--out", str(path.parent / "picture.png")]) == 0
+
+
+def test_a_row_that_is_being_written_is_left_out(path):
+    found = run(path, DRY.replace("0.02", "0.001"))
+    rows = len(read_series(found))
+    record = read_record(found)
+    record.status = "interrupted"
+    record.write(found)
+    with (found / "series.csv").open("a") as file:
+        file.write("1650,0.09,2,0.0")
+    assert len(read_series(found)) == rows
+    with (found / "series.csv").open("a") as file:
+        file.write("\n")
+    with pytest.raises(InputError, match=r"damaged after its last checkpoint: .*[^.]\. Go on from there with"):
+        read_series(found)
+
+
 def test_parquet_is_missed_before_the_run(path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     path.write_text(DRY + '[output]\ntable_format = "parquet"\n')

@@ -28,7 +28,11 @@ fluid = {{ viscosity = 1.0, density = 1000.0 }}
 walls = {{ y_min = {{ pressure = 1.0 }}, y_max = {{ pressure = 0.0 }}, lateral = {{ slip = {slip} }} }}
 mesh = {{ unite_tolerance = {unite} }}
 flow = {{ conductance = "{model}", solver = "{solver}", gravity = [0.0, 0.0, -9.81] }}
-output = {{ directory = "results/flow", quantities = ["permeability", "pressure", "forces"], vtk = true }}
+
+[output]
+directory = "results/flow"
+quantities = ["permeability", "pressure", "forces", "profile", "pore_sizes", "constriction_sizes", "planes"]
+vtk = true
 """
 FLOWS = [
     {"packing": packing, "slip": slip, "unite": unite, "model": model, "solver": solver}
@@ -84,6 +88,8 @@ def run_everything(folder: Path) -> None:
     packing = Packing.read(DATA / "packings" / "n54_s1.csv")
     mesh = PoreMesh(packing)
     cell_strains(mesh, np.zeros((54, 3)), np.zeros(6)), mesh.volume_gradients
+    cemented = PoreMesh(Packing(packing.centres, 1.3 * packing.radii, packing.box), wall_tolerance=1.0)
+    _ = cemented.facets.volumes, cemented.cell_void_volumes
     for made in (packing, Packing(packing.centres.copy(), packing.radii.copy(), packing.box)):
         for model in (None, HydraulicRadius()):
             flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)

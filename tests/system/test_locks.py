@@ -3,17 +3,22 @@
 import json
 import multiprocessing
 import os
+import shutil
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
+from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
 from porefv.errors import InputError
 from porefv.system import locks
 from porefv.system.atomic_files import atomic_directory, locked, put_back
+from porefv.system.signals import ENDING, Terminated, end, handled
 
 HOLD = """
 import sys, time
@@ -152,10 +157,22 @@ def test_without_locks_of_the_system_the_file_decides(tmp_path, monkeypatch):
     with locked(tmp_path / "results"):
         for _ in range(5):
             time.sleep(0.2)
+            locks.touch()
             with pytest.raises(InputError, match="being written"), locked(tmp_path / "results"):
                 pass
     with locked(tmp_path / "results"):
         pass
+
+
+def test_without_locks_of_the_system_a_process_that_is_gone_is_known_on_its_host(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "fcntl", None)
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    for host, refused in ((socket.gethostname(), False), ("node17", True)):
+        holder = {"host": host, "process": process.pid, "since": "yesterday", "locked": False}
+        (tmp_path / ".results.porefv-lock").write_text(json.dumps(holder))
+        with pytest.raises(InputError, match="on node17") if refused else nullcontext(), locked(tmp_path / "results"):
+            pass
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[1]", b"\xff" * 10_000, b"{}"])
@@ -222,3 +239,56 @@ def test_what_was_replaced_and_what_was_not_complete_is_removed(tmp_path):
         pass
     assert sorted(path.name for path in tmp_path.iterdir()) == [".results-0123456789ab.csv", "results"]
     assert (tmp_path / "results" / "summary.json").read_text() == "new"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_between_or_after_the_two_renamings(tmp_path, monkeypatch, number):
+    rename = os.rename
+
+    def interrupted(source, target):
+        rename(source, target)
+        if Path(source).name == at and not sent:
+            sent.append(at)
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(os, "rename", interrupted)
+    for at, left in (("results", "old"), (".results.porefv-new", "new")):  # noqa: B007
+        results(tmp_path / "results")
+        sent = []
+        with (
+            pytest.raises((KeyboardInterrupt, Terminated)),
+            handled(lambda number, _: end(number), *ENDING),
+            atomic_directory(tmp_path / "results", force=True) as folder,
+        ):
+            (folder / "summary.json").write_text("new")
+        with locked(tmp_path / "results"):
+            assert (tmp_path / "results" / "summary.json").read_text() == left
+        assert [path.name for path in tmp_path.iterdir()] == ["results"]
+        shutil.rmtree(tmp_path / "results")
+
+
+def test_what_stands_in_the_way_is_removed_whatever_it_is(tmp_path):
+    new = tmp_path / ".results.porefv-new"
+    (tmp_path / "precious").mkdir()
+    for make in (new.touch, lambda: new.symlink_to("precious"), lambda: new.symlink_to("nowhere")):
+        make()
+        with atomic_directory(tmp_path / "results", force=True) as folder:
+            (folder / "summary.json").write_text("{")
+    results(tmp_path / ".results.porefv-old")
+    (tmp_path / ".results.porefv-old" / "more").mkdir()
+    (tmp_path / ".results.porefv-old" / "more").chmod(0o555)
+    with locked(tmp_path / "results"):
+        pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["precious", "results"]
+
+
+def test_results_of_another_program_are_not_replaced(tmp_path):
+    results(tmp_path / "results", '{"mine": 1}')
+    with pytest.raises(InputError, match="not results of porefv"), atomic_directory(tmp_path / "results", force=True):
+        pass
+
+
+def test_a_link_to_itself_is_no_place_for_results(tmp_path):
+    (tmp_path / "results").symlink_to("results")
+    with pytest.raises(InputError, match="a link to itself"), atomic_directory(tmp_path / "results"):
+        pass

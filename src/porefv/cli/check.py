@@ -72,6 +72,7 @@ def scene_text(scene: FlowScene, packing: Packing) -> str:
             "packing",
             f"{path_text(scene.packing.file)}: {count_text(len(packing))} spheres, radii {range_text(packing.radii)} m",
         ),
+        ("reading", str(packing.reading)),
         (
             "overlaps",
             f"{count_text(len(overlaps.pairs))} pairs of spheres, {count_text(len(overlaps.wall_ids))} across walls",

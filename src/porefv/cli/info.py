@@ -47,7 +47,7 @@ def summary_text(results: Results) -> str:
     """
     try:
         return _summary_text(results)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{results.directory}: summary.json is damaged: {reason}. Solve again.") from None
 
@@ -63,7 +63,6 @@ def _summary_text(results: Results) -> str:
             ("hidden spheres", packing["hidden_spheres"] or None),
             ("overlapping pairs", count_text(packing['overlapping_pairs'])),
             ("porosity", f"{packing['porosity']:.6g}"),
-            ("porosity error", _bound(packing["porosity_error"], "too high, where three spheres meet")),
             ("pore volume", f"{packing['pore_volume']:.6g} m³"),
         ]),
         ("Pores", [
@@ -73,6 +72,7 @@ def _summary_text(results: Results) -> str:
         ]),
         ("Flow", _flow_rows(summary)),
         ("Permeabilities along the axes", _axes_rows(summary)),
+        ("Sample", _sample_rows(summary)),
         ("Forces on the spheres", _force_rows(summary)),
         ("Computation", [
             *_solver_rows(summary),
@@ -99,6 +99,7 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("conductance", flow["conductance"]),
         ("inflow", f"{flow['inflow']:.6g} m³/s"),
         ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("outside tested range", _outside(summary.get("reliability"))),
         ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
     if any("inflow" in wall or "velocity" in wall for wall in summary["walls"].values()):
@@ -124,6 +125,51 @@ def _axes_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     found = summary["permeabilities"]
     rows = [(axis, f"{found[axis]:.6g} m²") for axis in "xyz"]
     return [*rows, ("walls beside the flow", "slip" if found["slip"] else "no-slip")]
+
+
+def _outside(found: Mapping[str, float] | None) -> str | None:
+    """How much of the flow is where the model was not tested, if that is worth a word."""
+    if found is None or found["outside"] < 0.01:
+        return None
+    parts = {name.replace("_", " "): part for name, part in found.items() if name != "outside" and part >= 0.01}
+    kinds = ", ".join(f"{name} {100 * part:.0f} %" for name, part in parts.items())
+    return f"{100 * found['outside']:.0f} % of the dissipation ({kinds})"
+
+
+def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """The quantities of the sample besides permeability and forces."""
+    rows: list[tuple[str, Any]] = []
+    if "tortuosity" in summary:
+        tortuosity = summary["tortuosity"]
+        rows.append(("tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}"))
+    if "velocity" in summary:
+        rows += [
+            ("Darcy velocity", f"({vector_text(summary['velocity']['darcy'])}) m/s"),
+            ("interstitial velocity", f"({vector_text(summary['velocity']['interstitial'])}) m/s"),
+        ]
+    if "profile" in summary:
+        profile = summary["profile"]
+        layers = f"{count_text(profile['layers'])} layers along {profile['axis']}"
+        rows.append(("profile", f"{layers}, porosity {range_text(profile['porosity'])}"))
+    for name, title, weights in (
+        ("pore_sizes", "pore radius", {"by_number": "by number", "by_volume": "by void volume"}),
+        ("constriction_sizes", "constriction radius", {"by_number": "by number", "by_flux": "by flux"}),
+    ):
+        rows += [
+            (f"{title}, {words}", _radii(summary[name][kind])) for kind, words in weights.items() if name in summary
+        ]
+    if summary.get("planes", {}).get("flux"):
+        planes = summary["planes"]
+        count = f"{count_text(planes['planes'])} planes along {planes['axis']}"
+        fluxes = dict.fromkeys(f"{flux:.6g}" for flux in planes["flux"])  # one, where they are the same
+        rows.append(("flux through planes", f"{' to '.join(fluxes)} m³/s, {count}"))
+    return rows
+
+
+def _radii(found: Mapping[str, float | None]) -> str:
+    if found["mean"] is None:
+        return "none"
+    return f"median {found['r50']:.4g} m, 10 % below {found['r10']:.4g} m, 90 % below {found['r90']:.4g} m"
 
 
 def _force_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:

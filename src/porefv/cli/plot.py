@@ -6,12 +6,18 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from porefv.errors import InputError
+
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
     parser = commands.add_parser("plot", help="draw results: grains and pores of solve, time series of simulate")
     parser.add_argument("results", metavar="RESULTS", type=Path)
     parser.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
+    parser.add_argument(
+        "--what", choices=("profile", "pore_sizes", "constriction_sizes"),
+        help="draw this quantity of solve in place of the grains and pores",
+    )  # fmt: skip
     parser.set_defaults(command=run)
 
 
@@ -22,9 +28,16 @@ def run(options: argparse.Namespace) -> None:
 
     with Progress().stage("drawing"):
         if is_simulation(options.results):
+            if options.what:
+                raise InputError(f"{options.results} holds a simulation; --what is for results of porefv solve")
             from porefv.simulation.series_picture import draw_series
 
             draw_series(options.results, options.out)
+        elif options.what:
+            from porefv.results.quantity_pictures import draw_quantity
+            from porefv.results.reading import read
+
+            draw_quantity(read(options.results), options.what, options.out)
         else:
             from porefv.results.drawing import draw
             from porefv.results.reading import read

@@ -9,34 +9,50 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, NoReturn
 
-from porefv.cli import check, info, pack, plot, reference, simulate, solve, trade
-from porefv.cli.text import flush
-from porefv.errors import PorefvError, printable
+from porefv.cli import check, export, info, pack, plot, reference, simulate, solve, trade
+from porefv.cli.text import flush, say
+from porefv.errors import InputError, PorefvError, printable
 from porefv.system import memory
-from porefv.system.signals import Terminated, end, handled
+from porefv.system.signals import ENDING, Terminated, end, handled
 from porefv.system.version import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input), 130 (interrupted) or 143 (SIGTERM)."""
-    with handled(lambda number, _: end(number), signal.SIGTERM):
+    came: list[int] = []
+
+    def interrupted(number: int, _: Any) -> None:
+        came.append(number)
+        end(number)
+
+    with handled(interrupted, *ENDING):
         try:
             options = _parser().parse_args(arguments)
+            _check_arguments(options)
             with _warnings_in_a_line(quiet=getattr(options, "quiet", False)):
                 if options.command is not info.run:
                     memory.ensure_libraries()
                 options.command(options)
             return 0
         except (Exception, KeyboardInterrupt, Terminated) as error:
-            return _failed(error)
+            return _failed(error, came)
 
 
-def _failed(error: BaseException) -> int:
-    """Say what went wrong, and give the exit status."""
-    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt | Terminated):
-        error = error.__cause__  # it came within a kernel, as that handed its arrays over
+def _check_arguments(options: argparse.Namespace) -> None:
+    """InputError if a path has a line break: it would look like a line of ours."""
+    for path in vars(options).values():
+        if isinstance(path, Path) and len(str(path).splitlines()) > 1:
+            raise InputError(f"a path in one line is needed, not {str(path)!r}")
+
+
+def _failed(error: BaseException, signals: Sequence[int] = ()) -> int:
+    """Say what went wrong, and give the exit status; `signals` have come meanwhile."""
+    if signals and not isinstance(error, KeyboardInterrupt | Terminated | PorefvError):
+        # Libraries turn one that comes while they load, or hand arrays over, into errors of their own.
+        error = Terminated() if signals[0] == signal.SIGTERM else KeyboardInterrupt()
     match error:
         case PorefvError():
             return _fail(str(error), error.exit_status)
@@ -121,9 +137,16 @@ class _CommandParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         super().error(printable(message, 500))
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """As argparse, which takes no notice of an output that cannot be written to."""
+        if file is sys.stderr:
+            super()._print_message(message, file)
+        else:
+            say(message.rstrip("\n"))
+
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _CommandParser(
         prog="porefv",
         description="Packings of spheres, and flow through them: permeability, pressures, forces on every grain.",
         epilog="A scene says what is wanted, and only that is computed. "
@@ -131,6 +154,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"porefv {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_CommandParser)
-    for command in (pack, solve, simulate, reference, trade, check, info, plot):
+    for command in (pack, solve, simulate, reference, trade, check, info, plot, export):
         command.register(commands)
     return parser

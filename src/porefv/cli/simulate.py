@@ -65,6 +65,7 @@ def scene_text(scene: SimulationScene, grains: DEM) -> str:
     """What `porefv check` says of a simulation."""
     size = " × ".join(f"{length:g}" for length in grains.box.size)
     lines = [
+        f"read as {scene.read_packing().reading}",
         f"{counted(len(grains), 'grain')} in a box of {size} m, porosity {grains.porosity:.4f}, "
         f"{grains.coordination:.1f} contacts a grain",
         f"steps of {grains.step:.3g} s; results to {scene.output.directory}",

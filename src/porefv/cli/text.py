@@ -10,6 +10,9 @@ from typing import Any
 
 from porefv.errors import PorefvError, printable
 
+# Most characters of a value that a file says.
+_MOST = 300
+
 
 def say(text: str) -> None:
     """Print a text on standard output. What is not printable in it, or not known to the output's encoding, is escaped.
@@ -67,7 +70,7 @@ def rows_text(rows: Iterable[tuple[str, Any]]) -> list[str]:
     """Rows of a name and a value, aligned; rows whose value is None are left out."""
     rows = [(name, value) for name, value in rows if value is not None]
     width = max(len(name) for name, _ in rows)
-    return [f"  {name:{width}}  {value}" for name, value in rows]
+    return [f"  {name:{width}}  {printable(str(value), _MOST)}" for name, value in rows]
 
 
 def count_text(number: int) -> str:
@@ -93,4 +96,4 @@ def axes_text(values: Mapping[str, float]) -> str:
 
 def path_text(path: str | os.PathLike[str]) -> str:
     """A path without redundant parts."""
-    return str(Path(os.path.normpath(path)))
+    return printable(str(Path(os.path.normpath(path))), _MOST)

@@ -79,7 +79,8 @@ def load(path: str | PathLike[str], conductance: ConductanceModel | None = None)
         if header["version"] == 1:
             header, prefix = _renamed(header), "grains_"
         grains = {name.removeprefix(prefix): array for name, array in content.items() if name.startswith(prefix)}
-        saved, described = _of_package(header["conductance"]), header["conductance"]
+        described = {"name": str(header["conductance"]["name"])} | header["conductance"]
+        saved = _of_package(described)
         walls, fluid = Walls.from_mapping(header["walls"]), Fluid(**header["fluid"])
         settings, effort = CouplingSettings(**header["settings"]), Effort(**header["effort"])
         state = state_files.restored(CouplingState, content, header["numbers"])

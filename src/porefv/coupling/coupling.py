@@ -24,6 +24,7 @@ from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
+from porefv.system.number_checks import is_finite_number
 from porefv.system.timer import Timer
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
@@ -80,6 +81,15 @@ class Effort:
     seconds: dict[str, float] = field(
         default_factory=lambda: {"mesh": 0.0, "grains": 0.0, "pressure": 0.0, "forces": 0.0}
     )
+
+    def __post_init__(self) -> None:
+        counts = (self.steps, self.iterations, self.meshes)
+        if not all(type(count) is int and count >= 0 for count in counts):
+            raise ValueError(f"steps, iterations and meshes are counts, not {counts}")
+        if {*self.seconds} != {"mesh", "grains", "pressure", "forces"}:
+            raise ValueError(f"the seconds are of {', '.join(self.seconds)}")
+        if not all(is_finite_number(time) for time in self.seconds.values()):
+            raise ValueError("the seconds are no numbers")
 
 
 class Coupling:

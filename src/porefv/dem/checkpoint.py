@@ -85,7 +85,7 @@ class Settings:
     ranges: int
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.gravity).all() and 0.0 <= self.damping < 1.0 and 0.0 < self.step < np.inf):
+        if not (np.isfinite(self.gravity).all() and 0.0 <= self.damping < 1.0 and 1e-60 < self.step < 1e60):
             raise ValueError("gravity, damping or step is out of range")
 
 

@@ -232,7 +232,7 @@ def damage_refused(path: str | PathLike[str], name: str) -> Iterator[None]:
         yield
     except KeyError as error:
         raise _unreadable(path, f"{error} is missing", name) from None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise _unreadable(path, str(error), name) from None
 
 

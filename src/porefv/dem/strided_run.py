@@ -9,6 +9,7 @@ import numpy as np
 
 from porefv.dem.dem import DEM
 from porefv.errors import ComputationError, InputError
+from porefv.system import locks
 from porefv.system.number_checks import is_finite_number
 
 # Steps of a stride.
@@ -55,6 +56,7 @@ class StridedRun:
         """Take some steps; the mean stress after them [Pa]."""
         dem = self.dem
         dem.run(steps)
+        locks.touch()
         self.strides += 1
         stress = mean_stress(dem)
         if self.report is not None and self.strides % 20 == 0:

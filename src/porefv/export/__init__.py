@@ -1,4 +1,4 @@
-"""Meshes, fields and runs for other programs: VTK, ParaView, PyVista, meshio, and pictures.
+"""Meshes, fields and runs for other programs: VTK, ParaView, PyVista, meshio, OpenPNM, and pictures.
 
 Names are imported when they are first used: to write a steady flow takes no grains that move.
 """
@@ -9,13 +9,14 @@ from porefv.system.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from porefv.export.meshio_mesh import to_meshio
+    from porefv.export.openpnm_network import openpnm_network
     from porefv.export.pictures import flow_picture, picture
     from porefv.export.trajectories import Trajectory
     from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, to_pyvista
 
 __all__ = [
-    "Trajectory", "cells_grid", "flow_picture", "picture", "spheres_polydata", "throats_polydata", "to_meshio",
-    "to_pyvista",
+    "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "picture", "spheres_polydata", "throats_polydata",
+    "to_meshio", "to_pyvista",
 ]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
@@ -23,6 +24,7 @@ __getattr__, __dir__ = lazy_exports(
         "Trajectory": "porefv.export.trajectories",
         "cells_grid": "porefv.export.vtk_datasets",
         "flow_picture": "porefv.export.pictures",
+        "openpnm_network": "porefv.export.openpnm_network",
         "picture": "porefv.export.pictures",
         "spheres_polydata": "porefv.export.vtk_datasets",
         "throats_polydata": "porefv.export.vtk_datasets",

@@ -14,8 +14,11 @@ from porefv.mesh.pore_mesh import PoreMesh
 
 if TYPE_CHECKING:
     import meshio
+    import pyvista
 
 NAMES = {TETRA: "tetra", WEDGE: "wedge", HEXAHEDRON: "hexahedron"}  # meshio's names of VTK's types
+# meshio mirrors wedges in VTK files, for the order that VTK had before 9.7. Mirrored here, they are right there.
+_WEDGE_NODES = [0, 2, 1, 3, 5, 4]
 
 
 def to_meshio(mesh: CellMesh, **cell_data: Any) -> meshio.Mesh:
@@ -36,15 +39,11 @@ def to_meshio(mesh: CellMesh, **cell_data: Any) -> meshio.Mesh:
     InputError
         If an array has a row for neither each cell nor each pore.
     """
-    try:
-        import meshio
-    except ModuleNotFoundError:
-        raise MissingExtraError("meshio", "to_meshio()") from None
+    meshio = _meshio("to_meshio()")
     solids = polyhedra(mesh)
     blocks = {NAMES[kind]: solids.of_type(kind) for kind in (TETRA, WEDGE, HEXAHEDRON)}
     ids, wedges = blocks["wedge"]
-    # meshio mirrors wedges in VTK files, for the order that VTK had before 9.7. Mirrored here, they are right there.
-    blocks["wedge"] = ids, wedges[:, [0, 2, 1, 3, 5, 4]]
+    blocks["wedge"] = ids, wedges[:, _WEDGE_NODES]
     blocks = {name: block for name, block in blocks.items() if len(block[0])}
     data = {"cell": [ids for ids, _ in blocks.values()]}
     if isinstance(mesh, PoreMesh):
@@ -53,3 +52,40 @@ def to_meshio(mesh: CellMesh, **cell_data: Any) -> meshio.Mesh:
         by_cell = values_by_cell(mesh, name, np.asarray(values))
         data[name] = [by_cell[ids] for ids, _ in blocks.values()]
     return meshio.Mesh(solids.points, [(name, nodes) for name, (_, nodes) in blocks.items()], cell_data=data)
+
+
+def meshio_from_vtk(grid: pyvista.UnstructuredGrid) -> meshio.Mesh:
+    """The cells of pores.vtu with their cell data as a `meshio.Mesh`, in blocks of one type.
+
+    Nodes are in the order of meshio, which is that of Gmsh and Abaqus: before it writes a VTK file, see
+    `mirror_wedges`.
+
+    Raises
+    ------
+    MissingExtraError
+        If meshio is not installed.
+    """
+    meshio = _meshio("Writing meshes in other formats")
+    blocks, data = [], {name: list[np.ndarray]() for name in grid.cell_data}
+    for kind, name in NAMES.items():
+        cells = np.flatnonzero(grid.celltypes == kind)
+        if len(cells):
+            blocks.append((name, grid.cells_dict[np.uint8(kind)]))
+            for array, parts in data.items():
+                parts.append(np.asarray(grid.cell_data[array])[cells])
+    return meshio.Mesh(np.asarray(grid.points), blocks, cell_data=data)
+
+
+def mirror_wedges(mesh: meshio.Mesh) -> None:
+    """Exchange nodes of the wedges of a mesh, so that they are right in VTK files that meshio writes."""
+    for block in mesh.cells:
+        if block.type == "wedge":
+            block.data = block.data[:, _WEDGE_NODES]
+
+
+def _meshio(purpose: str) -> Any:
+    try:
+        import meshio
+    except ModuleNotFoundError:
+        raise MissingExtraError("meshio", purpose) from None
+    return meshio

@@ -2,11 +2,11 @@
 
 A directory holds::
 
-    grains.pvd     frames grains_000012000.vtp: centres with radii, velocities, spins and resultant forces
+    grains.pvd     frames grains_000012000.vtp: centres with radii, velocities, spins and resultant forces, and the box
     walls.pvd      frames walls_000012000.vtp: the six sides of the box with their velocities and forces
     contacts.pvd   frames contacts_000012000.vtp: a line per contact with its force
 
-Numbers are those of steps, times in a .pvd are seconds.
+Numbers are those of steps, times in a .pvd are seconds. `Packing.read` reads grains.pvd and its frames.
 """
 
 from __future__ import annotations

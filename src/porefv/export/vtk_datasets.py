@@ -57,12 +57,17 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
 
 
 def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
-    """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows)."""
+    """The spheres' centres as vertices with the point data `id`, `radius` and those given (n rows).
+
+    Field data `box_lower` and `box_upper` give the box, so that `Packing.read` reads a file of it back.
+    """
     n = len(packing)
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(packing.centres))
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
     attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
+    if packing.box is not None:
+        attach(polydata.GetFieldData(), {"box_lower": packing.box.lower, "box_upper": packing.box.upper}, 3)
     return polydata
 
 
@@ -71,13 +76,8 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
 
     Points are Laguerre vertices, that of a united pore the mean of several.
     """
-    mesh = throats.mesh
-    points = mesh.vertices
-    if mesh.n_united:
-        count = np.bincount(mesh.cell_pore, minlength=mesh.n_pores)
-        points = np.stack([np.bincount(mesh.cell_pore, x, mesh.n_pores) / count for x in points.T], axis=1)
     polydata = vtk_data_model().vtkPolyData()
-    polydata.SetPoints(vtk_points(points))
+    polydata.SetPoints(vtk_points(throats.mesh.pore_points))
     polydata.SetLines(cell_array(throats.pores))
     attach(polydata.GetCellData(), cell_data, len(throats))
     return polydata

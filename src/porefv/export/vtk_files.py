@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,8 +44,26 @@ def write_xml(dataset: vtkUnstructuredGrid | vtkPolyData, path: Path) -> None:
     writer.SetEncodeAppendedData(False)
     writer.SetHeaderTypeToUInt64()
     writer.SetCompressorTypeToLZ4()
-    if not writer.Write():
-        raise OSError(f"VTK could not write {path.name}")
+    with _silence():
+        written = writer.Write()
+    if not written:
+        reason = _vtk("vtkCommonMisc").vtkErrorCode.GetStringFromErrorCode(writer.GetErrorCode())
+        raise OSError(f"VTK could not write {path.name}: {reason}")
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """What VTK says of errors, in lines of its own, is not printed."""
+    core = _vtk("vtkCommonCore")
+    window, before = core.vtkOutputWindow, core.vtkOutputWindow.GetInstance()
+    verbosity = core.vtkLogger.GetCurrentVerbosityCutoff()
+    window.SetInstance(core.vtkStringOutputWindow())
+    core.vtkLogger.SetStderrVerbosity(core.vtkLogger.VERBOSITY_OFF)
+    try:
+        yield
+    finally:
+        window.SetInstance(before)
+        core.vtkLogger.SetStderrVerbosity(verbosity)
 
 
 def vtk_array(values: np.ndarray) -> Any:

@@ -9,13 +9,15 @@ from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import PressureField, solve_pressure
 from porefv.flow.pressure_on_grains import SolidPressureWeights, acting_pressure, solid_pressure_weights
+from porefv.flow.profile import Profile
 from porefv.flow.regions import Point, Sphere
+from porefv.flow.sizes import ConstrictionSizes, Distribution, PoreSizes
 from porefv.flow.velocity import pore_velocities
 from porefv.flow.walls import Wall, Walls
 
 __all__ = [
-    "DirectionalPermeabilities", "FixedPressure", "FlowAtWalls", "FlowSource", "Fluid", "Forces", "Point", "PoreFlow",
-    "PressureField", "SolidPressureWeights", "Sphere", "Wall", "Walls", "acting_pressure",
-    "directional_permeabilities", "fluxes", "grain_forces", "pore_velocities", "solid_pressure_weights",
-    "solve_imposed_flow", "solve_pressure",
+    "ConstrictionSizes", "DirectionalPermeabilities", "Distribution", "FixedPressure", "FlowAtWalls", "FlowSource",
+    "Fluid", "Forces", "Point", "PoreFlow", "PoreSizes", "PressureField", "Profile", "SolidPressureWeights", "Sphere",
+    "Wall", "Walls", "acting_pressure", "directional_permeabilities", "fluxes", "grain_forces", "pore_velocities",
+    "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
 ]  # fmt: skip

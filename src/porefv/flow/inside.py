@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.errors import ComputationError, InputError, vector
-from porefv.flow.regions import Region, check_region, pore_vertices, pores_in, region_text
+from porefv.flow.regions import Region, check_region, pores_in, region_text
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
@@ -172,6 +172,6 @@ def refuse_sources_without_outlet(mesh: PoreMesh, sources: np.ndarray, connected
     if len(wrong):
         pore = int(wrong[0])
         raise ComputationError(
-            f"pore {pore} at {vector(pore_vertices(mesh)[pore])} m has a source of {sources[pore]:.6g} m³/s, and no "
+            f"pore {pore} at {vector(mesh.pore_points[pore])} m has a source of {sources[pore]:.6g} m³/s, and no "
             "open path leads from it to an imposed pressure"
         )

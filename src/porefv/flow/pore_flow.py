@@ -31,7 +31,11 @@ from porefv.flow.pressure import (
     solve_pressure,
 )
 from porefv.flow.pressure_on_grains import acting_pressure
-from porefv.flow.velocity import pore_velocities
+from porefv.flow.profile import Profile, axis_number, plane_fluxes, profile
+from porefv.flow.reliability import Reliability, reliability
+from porefv.flow.sizes import ConstrictionSizes, PoreSizes, constriction_sizes, pore_sizes
+from porefv.flow.tortuosity import hydraulic_tortuosity
+from porefv.flow.velocity import darcy_velocity, pore_velocities
 from porefv.flow.walls import Walls, condition_text, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
@@ -409,6 +413,58 @@ class PoreFlow(FixedInputs):
         power = float((self.conductances * drop**2).sum())
         return missing / (power + missing) if missing > 0.0 else 0.0
 
+    @lazy_property
+    def reliability(self) -> Reliability:
+        """Parts of the dissipation in throats outside the range where the conductance model was tested."""
+        return reliability(self)
+
+    # ---- quantities of the sample ---------------------------------------------------------------------------------
+
+    @lazy_property
+    def darcy_velocity(self) -> np.ndarray:
+        """(3,): mean velocity over the box, grains at rest included (`flow.velocity.darcy_velocity`) [m/s]."""
+        if self._inside is not None:  # fluid enters inside the box, too
+            return (self.pore_velocity * self.mesh.pore_volumes[:, None]).sum(axis=0) / self.mesh.box.volume
+        return darcy_velocity(self.mesh, self._face_flux)
+
+    @property
+    def interstitial_velocity(self) -> np.ndarray:
+        """(3,): mean velocity of the fluid, the Darcy velocity over the porosity [m/s]."""
+        return self.darcy_velocity / self.mesh.packing.porosity
+
+    @lazy_property
+    def tortuosity(self) -> float:
+        """Hydraulic tortuosity (`flow.tortuosity.hydraulic_tortuosity`); NaN if nothing flows.
+
+        Raises
+        ------
+        InputError
+            If the pressure walls are not one pair of opposite walls.
+        """
+        if self.walls.axis is None or self._inside is not None:
+            raise InputError(
+                "tortuosity needs exactly two pressure walls, opposite each other, and no regions that drive"
+            )
+        return hydraulic_tortuosity(self.mesh, self.flux, self._face_flux, self.walls.axis)
+
+    @lazy_property
+    def pore_sizes(self) -> PoreSizes:
+        """Void volume and largest inscribed sphere of each pore."""
+        return pore_sizes(self.mesh)
+
+    @lazy_property
+    def constriction_sizes(self) -> ConstrictionSizes:
+        """Largest inscribed circle of each throat, and the size of its flux."""
+        return constriction_sizes(self.mesh, self.flux, self.walls.slip)
+
+    def profile(self, layers: int = 10, axis: str | None = None) -> Profile:
+        """Porosity and mean pressure of equally thick layers along "x", "y" or "z", the axis of flow by default."""
+        return profile(self.mesh, self.pressure, axis_number(axis, self.walls), layers)
+
+    def plane_fluxes(self, places: Sequence[float] | np.ndarray, axis: str | None = None) -> np.ndarray:
+        """(p,): flux through planes at places (p,) along an axis, that of flow by default (`flow.profile`) [m³/s]."""
+        return plane_fluxes(self.mesh, self.flux, self._face_flux, axis_number(axis, self.walls), places)
+
     # ---- forces -------------------------------------------------------------------------------------------------
 
     @lazy_property
@@ -431,6 +487,12 @@ class PoreFlow(FixedInputs):
         from porefv.fipy.pressure_problem import FipyProblem
 
         return FipyProblem(self)
+
+    def to_openpnm(self) -> dict[str, np.ndarray]:
+        """The network with its conductances in the names of OpenPNM (see `porefv.export.openpnm_network`)."""
+        from porefv.export.openpnm_network import flow_to_openpnm
+
+        return flow_to_openpnm(self)
 
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 

@@ -95,7 +95,7 @@ def pores_in(mesh: PoreMesh, region: Region) -> np.ndarray:
     """
     if isinstance(region, Point):
         return np.array([pore_at(mesh, np.array(region.position))])
-    vertices = pore_vertices(mesh)
+    vertices = mesh.pore_points
     if isinstance(region, Sphere):
         inside = np.linalg.norm(vertices - region.centre, axis=1) <= region.radius
     else:
@@ -108,18 +108,11 @@ def pores_in(mesh: PoreMesh, region: Region) -> np.ndarray:
     return np.flatnonzero(inside)
 
 
-def pore_vertices(mesh: PoreMesh) -> np.ndarray:
-    """(n_pores, 3): Laguerre vertex of each pore, the mean of those of its cells [m]."""
-    counts = np.bincount(mesh.cell_pore, minlength=mesh.n_pores)
-    sums = [np.bincount(mesh.cell_pore, mesh.local_vertices[:, axis], mesh.n_pores) for axis in range(3)]
-    return np.stack(sums, axis=1) / counts[:, None] + mesh.triangulation.origin
-
-
 def pore_at(mesh: PoreMesh, position: np.ndarray) -> int:
     """The pore that a point (3,) of the box stands for [m]; see `Point`."""
     distances = np.linalg.norm(mesh.packing.centres - position, axis=1)
     if (distances < mesh.packing.radii).any():
-        return int(np.argmin(np.linalg.norm(pore_vertices(mesh) - position, axis=1)))
+        return int(np.argmin(np.linalg.norm(mesh.pore_points - position, axis=1)))
     # Cells are convex: a point is in the cell whose facets it is all behind.
     facets = mesh.facets
     local = position - mesh.triangulation.origin

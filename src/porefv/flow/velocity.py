@@ -1,4 +1,4 @@
-"""Mean velocities of the fluid in the pores, from the fluxes on their faces."""
+"""Mean velocities of the fluid, in each pore and in the sample, from the fluxes on the faces."""
 
 from __future__ import annotations
 
@@ -56,3 +56,24 @@ def _by_pore(mesh: PoreMesh, values: np.ndarray) -> np.ndarray:
     """(n_pores,): sums over the throats of each pore, of values of throats (t,)."""
     i, j = mesh.throats.pores.T
     return np.bincount(i, values, mesh.n_pores) + np.bincount(j, values, mesh.n_pores)
+
+
+def darcy_velocity(mesh: PoreMesh, face_flux: np.ndarray) -> np.ndarray:
+    """Mean of the velocity over the box, grains at rest included: ∫ u dV = ∮ x (u·n) dS over the walls.
+
+    Between two opposite walls its component along their axis is Q / S.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    face_flux : (w,) array
+        Flux into the sample through each wall face, taken to pass at its centroid [m³/s].
+
+    Returns
+    -------
+    (3,) array [m/s]
+    """
+    box = mesh.box
+    # From the middle of the box, so that an imbalance of the fluxes has the least effect.
+    middle = 0.5 * (box.lower + box.upper) - mesh.triangulation.origin
+    return -(face_flux[:, None] * (mesh.wall_faces.centroids - middle)).sum(axis=0) / box.volume

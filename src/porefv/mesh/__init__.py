@@ -2,7 +2,8 @@
 
 from porefv.mesh.cell_mesh import CellMesh, WallFaces
 from porefv.mesh.facets import Facets
+from porefv.mesh.inscribed_spheres import InscribedSpheres
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.mesh.throats import Throats
 
-__all__ = ["CellMesh", "Facets", "PoreMesh", "Throats", "WallFaces"]
+__all__ = ["CellMesh", "Facets", "InscribedSpheres", "PoreMesh", "Throats", "WallFaces"]

@@ -173,6 +173,9 @@ class CellMesh(FixedInputs):
     @lazy_property
     def cell_void_volumes(self) -> np.ndarray:
         """(m,): volume of each cell outside the spheres [m³]."""
+        if self.packing.triple_overlaps:
+            facets = self.facets
+            return self.cell_volumes - np.bincount(facets.cells.ravel(), facets.solids.ravel(), self.n_cells)
         solids = np.empty(self.n_cells)
         for_rows(cell_solids, self.n_cells, self.cells, self.cell_vertices, solids)
         return self.cell_volumes - solids

@@ -9,6 +9,7 @@ import numpy as np
 from porefv.mesh.facet_cross_sections import CrossSections, facet_cross_sections
 from porefv.mesh.facet_kernels import FacetPlanes, FacetTopology, enumerate_facets, facet_centroids
 from porefv.mesh.facet_volumes import facet_volumes
+from porefv.mesh.union_volumes import union_volumes
 from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.system.threads import for_rows
 
@@ -116,17 +117,28 @@ class Facets(FixedInputs):
 
     @lazy_property
     def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
+        if self.mesh.packing.triple_overlaps:
+            return self._union[:2]
         volumes, surfaces = np.empty(len(self)), np.empty((len(self), 3))
         for_rows(
-            facet_volumes,
-            len(self),
-            self.topology,
-            self.mesh.local_vertices,
-            self.mesh.cell_vertices,
-            volumes,
+            facet_volumes, len(self), self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes,
             surfaces,
-        )
+        )  # fmt: skip
         return volumes, surfaces
+
+    @lazy_property
+    def _union(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        volumes, surfaces, solids = np.empty(len(self)), np.empty((len(self), 3)), np.empty((len(self), 2))
+        for_rows(
+            union_volumes, len(self), self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes,
+            surfaces, solids,
+        )  # fmt: skip
+        return volumes, surfaces, solids
+
+    @property
+    def solids(self) -> np.ndarray:
+        """(f, 2): solid from each facet to the Laguerre vertex of its first, and of its second cell, signed [m³]."""
+        return self._union[2]
 
     @property
     def volumes(self) -> np.ndarray:

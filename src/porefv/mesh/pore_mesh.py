@@ -8,6 +8,7 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.inscribed_spheres import InscribedSpheres, inscribed_spheres
 from porefv.mesh.throats import Throats
 from porefv.mesh.uniting import unite
 from porefv.packing.box import Box
@@ -110,6 +111,27 @@ class PoreMesh(CellMesh):
         return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
 
     @lazy_property
+    def pore_points(self) -> np.ndarray:
+        """(n_pores, 3): Laguerre vertex of each pore, that of a united pore the mean of those of its cells [m]."""
+        if not self.n_united:
+            return self.vertices
+        count = np.bincount(self.cell_pore, minlength=self.n_pores)
+        return np.stack([np.bincount(self.cell_pore, x, self.n_pores) / count for x in self.vertices.T], axis=1)
+
+    @lazy_property
+    def pore_walls(self) -> np.ndarray:
+        """(n_pores,) uint8: the walls on which each pore has a face, as the sum of 2^w over them (w = 0: x_min)."""
+        found = np.zeros(self.n_pores, np.uint8)
+        faces = self.wall_faces
+        np.bitwise_or.at(found, self.cell_pore[faces.cells], (1 << faces.walls).astype(np.uint8))
+        return found
+
+    @lazy_property
+    def inscribed_spheres(self) -> InscribedSpheres:
+        """The largest sphere that was found in the void of each pore, at or near its Laguerre vertices."""
+        return inscribed_spheres(self)
+
+    @lazy_property
     def throats(self) -> Throats:
         """The throats between the pores."""
         return Throats(self)
@@ -125,6 +147,12 @@ class PoreMesh(CellMesh):
         from porefv.fipy.pore_mesh import FipyPoreMesh
 
         return FipyPoreMesh(self, held)
+
+    def to_openpnm(self) -> dict[str, np.ndarray]:
+        """The pores and throats as a plain dictionary in the names of OpenPNM (see `porefv.export.openpnm_network`)."""
+        from porefv.export.openpnm_network import mesh_to_openpnm
+
+        return mesh_to_openpnm(self)
 
     def __repr__(self) -> str:
         return (

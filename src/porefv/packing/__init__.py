@@ -4,5 +4,6 @@ from porefv.packing.box import WALLS, Box
 from porefv.packing.files import read_packing, write_packing
 from porefv.packing.overlaps import Overlaps
 from porefv.packing.packing import Packing, Source
+from porefv.packing.reading import Reading
 
-__all__ = ["WALLS", "Box", "Overlaps", "Packing", "Source", "read_packing", "write_packing"]
+__all__ = ["WALLS", "Box", "Overlaps", "Packing", "Reading", "Source", "read_packing", "write_packing"]

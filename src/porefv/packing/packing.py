@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -10,11 +10,15 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from porefv.errors import ComputationError, InputError, counted, vector
+from porefv.errors import InputError, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
+from porefv.packing.reading import Reading
 
 _MOST_SHOWN = 5  # culprits listed in one error
+
+# Spheres that differ by less, relative to the radius of the smaller, are at one place.
+_WITHIN = 1e-9
 
 # Lengths whose sixth powers a double holds, which is what the geometry of throats multiplies; and the smallest radius,
 # relative to the box, whose place in it rounding leaves.
@@ -30,10 +34,13 @@ class Source:
     path : path
     lines : (n,) integer array, optional
         Line of each sphere, counted from 1; None for binary formats.
+    reading : Reading, optional
+        What the reader understood of the file.
     """
 
     path: str | PathLike[str]
     lines: NDArray[np.integer] | None = None
+    reading: Reading | None = None
 
     def name(self, sphere: int) -> str:
         """``line 7 (sphere 5)``, or ``sphere 5`` if there are no lines."""
@@ -110,11 +117,24 @@ class Packing:
         )
 
     @classmethod
-    def read(cls, path: str | PathLike[str], format: str | None = None, box: Box | None = None) -> Packing:
+    def read(
+        cls,
+        path: str | PathLike[str],
+        format: str | None = None,
+        box: Box | None = None,
+        *,
+        columns: Mapping[str, str] | None = None,
+        radius: float | None = None,
+        scale: float | None = None,
+        frame: int | None = None,
+        periodic: str | None = None,
+    ) -> Packing:
         """Read a packing file: see `porefv.packing.read_packing`."""
         from porefv.packing.files.registry import read_packing
 
-        return read_packing(path, format=format, box=box)
+        return read_packing(
+            path, format, box, columns=columns, radius=radius, scale=scale, frame=frame, periodic=periodic
+        )
 
     def write(self, path: str | PathLike[str], format: str | None = None) -> None:
         """Write a packing file: see `porefv.packing.write_packing`."""
@@ -125,6 +145,20 @@ class Packing:
     def with_box(self, box: Box) -> Packing:
         """The same spheres in another box."""
         return replace(self, box=box)
+
+    @property
+    def bounding_box(self) -> Box:
+        """The smallest box, with corners of few digits, that holds every sphere."""
+        lower = (self.centres - self.radii[:, None]).min(axis=0)
+        upper = (self.centres + self.radii[:, None]).max(axis=0)
+        digit = 10.0 ** (np.floor(np.log10((upper - lower).max())) - 5)
+        # What rounding adds to a bound does not push it to the next digit.
+        return Box(np.floor(lower / digit + 1e-6) * digit, np.ceil(upper / digit - 1e-6) * digit)
+
+    @property
+    def reading(self) -> Reading | None:
+        """What the reader understood of the file; None if the spheres come from no file."""
+        return self.source.reading if self.source else None
 
     @cached_property
     def overlaps(self) -> Overlaps:
@@ -146,9 +180,16 @@ class Packing:
     def solid_volume(self) -> float:
         """Volume of the union of the spheres, inside the box if there is one, m³.
 
-        Balls, less the lens shared by each overlapping pair, less the cap beyond each wall. Exact where no
-        point belongs to three of these at once, which moderate overlaps never reach.
+        Balls, less the lens shared by each overlapping pair, less the cap beyond each wall. Where a point belongs to
+        three of these at once, the spheres' shares of their Laguerre cells, which is exact for any overlap.
+
+        Raises
+        ------
+        InputError
+            If there are such points, and the packing is not one that cells can be made of (see `validate`).
         """
+        if self.triple_overlaps:
+            return self._union_volume
         found = self.overlaps
         i, j = found.pairs.T
         balls = sphere_volumes(self.radii)
@@ -156,51 +197,38 @@ class Packing:
         caps = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
         return float(balls.sum() - lenses.sum() - caps.sum())
 
+    @property
+    def _union_volume(self) -> float:
+        from porefv.mesh.cell_mesh import CellMesh
+
+        packing = self
+        if self.box is None:  # one that cuts nothing off
+            reach = 2.0 * self.radii.max()
+            packing = self.with_box(Box(self.centres.min(axis=0) - reach, self.centres.max(axis=0) + reach))
+        return float(CellMesh(packing, wall_tolerance=np.inf).facets.solids.sum())
+
     @cached_property
-    def _triple_overlaps(self) -> tuple[int, float]:
+    def triple_overlaps(self) -> int:
+        """Number of triples, of spheres or of spheres and walls, with a point in common."""
         found = self.overlaps
-        i, j = found.pairs.T
-        lenses = lens_volume(self.radii[i], self.radii[j], self.radii[i] + self.radii[j] - found.depths)
-        crossings, caps = np.zeros((2, len(self), 6))
-        crossings[found.wall_spheres, found.wall_ids] = found.wall_depths
-        caps[found.wall_spheres, found.wall_ids] = cap_volume(self.radii[found.wall_spheres], found.wall_depths)
+        if len(found.pairs) + len(found.wall_ids) == 0:
+            return 0
         from porefv.packing.triple_overlaps import triple_overlaps
 
-        return triple_overlaps(found.pairs, self.centres, self.radii, lenses, crossings, caps)
-
-    @property
-    def triple_overlaps(self) -> int:
-        """Number of triples, of spheres or of spheres and walls, with a point in common; if any, volumes are bounds."""
-        return int(self._triple_overlaps[0])
-
-    @property
-    def porosity_error(self) -> float:
-        """By how much `porosity` may exceed the true one: what triples share, at most; 0 where there are none."""
-        return float(self._triple_overlaps[1]) / self._require_box().volume
+        crossings = np.zeros((len(self), 6))
+        crossings[found.wall_spheres, found.wall_ids] = found.wall_depths
+        return int(triple_overlaps(found.pairs, self.centres, self.radii, crossings))
 
     @cached_property
     def porosity(self) -> float:
-        """Fraction of the box outside the spheres; where three meet in a point, no less than that (`porosity_error`).
-
-        Raises
-        ------
-        ComputationError
-            If spheres overlap so deeply that sums over pairs say less than nothing.
-        """
-        porosity = 1.0 - self.solid_volume / self._require_box().volume
-        if not -1e-9 <= porosity <= 1.0 and self.triple_overlaps:
-            raise ComputationError(
-                f"{self._path()}spheres overlap so deeply, {self.triple_overlaps} triples of them in common points, "
-                "that their volume cannot be told from that of pairs. Make their radii smaller."
-            )
-        return porosity
+        """Fraction of the box outside the union of the spheres; errors as of `solid_volume`."""
+        return 1.0 - self.solid_volume / self._require_box().volume
 
     def validate(self, wall_tolerance: float = 0.05) -> Packing:
         """Check that the spheres fit one another and the box.
 
-        Moderate overlap (cemented or compressed grains) is legitimate: two spheres may overlap until the
-        centre of one lies in the other, and a sphere may reach beyond a wall by a fraction of its radius.
-        Centres lie strictly inside the box.
+        Overlap (cemented or compressed grains, clumps) is legitimate, as long as no sphere lies within another one. A
+        sphere may reach beyond a wall by a fraction of its radius. Centres lie strictly inside the box.
 
         Parameters
         ----------
@@ -239,6 +267,11 @@ class Packing:
         enlarge = (
             f"Correct or remove these spheres, or give a box larger than {vector(box.lower)} to {vector(box.upper)}."
         )
+        if self.reading and self.reading.periodicity:
+            enlarge = (
+                "These spheres cross the boundaries of a periodic cell, whose other side porefv does not know. "
+                "Remove them, which leaves voids along the walls, or make the packing between walls."
+            )
         self._refuse(
             np.flatnonzero((distances <= 0).any(axis=1)),
             "centre not inside the box",
@@ -258,11 +291,11 @@ class Packing:
         )
         pairs = self.overlaps.pairs
         self._refuse(
-            np.flatnonzero(self.overlaps.depths >= self.radii[pairs].min(axis=1)),
-            "overlap so deep that the centre of one sphere lies in the other",
+            np.flatnonzero(self.overlaps.depths >= (2.0 - _WITHIN) * self.radii[pairs].min(axis=1)),
+            "one sphere lies within another",
             "pair",
-            lambda k: self._describe_deep(pairs[k, 0], pairs[k, 1], self.overlaps.depths[k]),
-            "Remove one sphere of each pair, or correct centres and radii.",
+            lambda k: self._describe_within(pairs[k, 0], pairs[k, 1]),
+            "Remove the inner sphere of each pair, or correct centres and radii.",
         )
         return self
 
@@ -298,15 +331,12 @@ class Packing:
             lines.append(f"  ... and {len(culprits) - _MOST_SHOWN} more")
         raise InputError("\n".join([*lines, remedy]))
 
-    def _describe_deep(self, i: int, j: int, depth: float) -> str:
-        """A pair whose overlap is at least the smaller radius."""
+    def _describe_within(self, i: int, j: int) -> str:
+        """A pair of which one sphere lies within the other."""
         small, big = (i, j) if self.radii[i] < self.radii[j] else (j, i)
+        how = f"sphere {small} lies inside sphere {big}"
         if (self.centres[i] == self.centres[j]).all():
             how = f"same centre {vector(self.centres[i])}"
-        elif depth >= 2 * self.radii[small]:
-            how = f"sphere {small} lies inside sphere {big}"
-        else:
-            how = f"the centre of sphere {small} lies in sphere {big}"
         return f"{self._name(i)} and {self._name(j)}: {how}"
 
     def _name(self, sphere: int) -> str:

@@ -1,4 +1,4 @@
-"""Points that belong to three spheres at once, or to two and the outside of the box: what sums over pairs leave out."""
+"""Points in three spheres at once, or in two and outside the box: sums over pairs are wrong there."""
 
 from __future__ import annotations
 
@@ -9,23 +9,16 @@ from porefv.system.kernels import helper, kernel
 
 
 @kernel
-def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
-    """How many triples have a point in common, and a bound on the sum of the volumes that they share.
-
-    A triple is three spheres, two spheres and a wall, or one sphere and two walls that meet. It shares no more than the
-    smallest lens or cap of its pairs.
+def triple_overlaps(pairs, centres, radii, crossings):
+    """How many triples have a point in common: three spheres, two spheres and a wall, or a sphere and two walls.
 
     Parameters
     ----------
     pairs : (m, 2) int array
         Overlapping spheres i < j, in lexicographic order.
     centres, radii : (n, 3), (n,) arrays
-    lenses : (m,) array
-        Volume shared by each pair.
     crossings : (n, 6) array
         How far each sphere reaches beyond each wall; not positive where it does not.
-    caps : (n, 6) array
-        Volume of each sphere beyond each wall.
     """
     n = radii.shape[0]
     first = np.zeros(n + 1, np.int64)
@@ -34,7 +27,6 @@ def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
     for i in range(n):
         first[i + 1] += first[i]
     count = 0
-    shared = 0.0
     for i in range(n):
         for a in range(first[i], first[i + 1]):
             j = pairs[a, 1]
@@ -45,19 +37,16 @@ def triple_overlaps(pairs, centres, radii, lenses, crossings, caps):
                     c += 1
                 if c < first[j + 1] and _meet(i, j, k, centres, radii):
                     count += 1
-                    shared += min(lenses[a], lenses[b], lenses[c])
             for w in range(6):
                 if crossings[i, w] > 0.0 and crossings[j, w] > 0.0 and _reach(i, j, w, centres, radii, crossings) > 0.0:
                     count += 1
-                    shared += min(lenses[a], caps[i, w], caps[j, w])
         for w in range(6):
             for v in range(w + 1, 6):
                 if WALL_AXES[w] == WALL_AXES[v] or crossings[i, w] <= 0.0 or crossings[i, v] <= 0.0:
                     continue
                 if (radii[i] - crossings[i, w]) ** 2 + (radii[i] - crossings[i, v]) ** 2 < radii[i] ** 2:
                     count += 1
-                    shared += min(caps[i, w], caps[i, v])
-    return count, shared
+    return count
 
 
 @helper

@@ -13,6 +13,7 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.results.force_table import FORCE_FILES, read_forces
+from porefv.results.quantity_tables import TABLES, read_quantity
 from porefv.system.atomic_files import put_back
 from porefv.system.optional_imports import load
 
@@ -47,6 +48,44 @@ class Results:
         return read_forces(self._file(next(written, FORCE_FILES["csv"]), 'add "forces" to the quantities'))
 
     @cached_property
+    def profile(self) -> np.ndarray:
+        """Structured array of profile.csv: `lower`, `upper`, `porosity` and `pressure` of each layer.
+
+        Like the tables below, it raises an InputError if the quantity was not asked for, or the table is damaged.
+        """
+        return self._read_quantity("profile")
+
+    @cached_property
+    def pore_sizes(self) -> np.ndarray:
+        """Structured array of pore_sizes.csv: a row per pore, `x`, `y`, `z` and `radius` of its inscribed sphere."""
+        return self._read_quantity("pore_sizes")
+
+    @cached_property
+    def constriction_sizes(self) -> np.ndarray:
+        """Structured array of constriction_sizes.csv: a row per throat, with `radius` and `flux`."""
+        return self._read_quantity("constriction_sizes")
+
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """Structured array of planes.csv: `place` and `flux` of each plane."""
+        return self._read_quantity("planes")
+
+    @property
+    def tortuosity(self) -> float | None:
+        """Hydraulic tortuosity; None if nothing flows."""
+        return self._of_summary("tortuosity")  # type: ignore[no-any-return]
+
+    @property
+    def darcy_velocity(self) -> np.ndarray:
+        """(3,): mean velocity over the box, grains included [m/s]."""
+        return np.array(self._of_summary("velocity")["darcy"])
+
+    @property
+    def interstitial_velocity(self) -> np.ndarray:
+        """(3,): mean velocity of the fluid [m/s]."""
+        return np.array(self._of_summary("velocity")["interstitial"])
+
+    @cached_property
     def pores(self) -> pyvista.UnstructuredGrid:
         """The mesh of pores.vtu; InputError without VTK files, as for `spheres` and `throats`."""
         return self._read_vtk("pores.vtu")
@@ -60,6 +99,18 @@ class Results:
     def throats(self) -> pyvista.PolyData:
         """The network of throats.vtp."""
         return self._read_vtk("throats.vtp")
+
+    def _read_quantity(self, quantity: str) -> np.ndarray:
+        path = self._file(TABLES[quantity].file, f'add "{quantity}" to the quantities')
+        return read_quantity(quantity, path)
+
+    def _of_summary(self, quantity: str) -> Any:
+        if quantity not in self.summary:
+            raise InputError(
+                f"{self.directory} has no {quantity}: add it to the quantities in the scene's [output], and solve "
+                "again."
+            )
+        return self.summary[quantity]
 
     def _file(self, name: str, remedy: str) -> Path:
         path = self.directory / name

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import ComputationError
+from porefv.conductance.section_friction.model import SectionFriction
+from porefv.errors import ComputationError, printable
 from porefv.flow.regions import region_text
+from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
@@ -30,6 +32,8 @@ UNITS = {
     "wall_flux": "m3/s", "wall_pressure": "Pa",
     "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
+    "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1",
+    "profile": "1",
 }  # fmt: skip
 
 
@@ -41,6 +45,7 @@ def summary_json(
     vtk: bool,
     table_format: str,
     seconds: Mapping[str, float],
+    sample: Mapping[str, Any],
     permeabilities: DirectionalPermeabilities | None = None,
     scene: str | None = None,
     packing: str | None = None,
@@ -56,18 +61,21 @@ def summary_json(
         What was asked for.
     seconds : mapping of str to float
         Wall time of each stage.
+    sample : mapping
+        What `quantity_summaries` returns.
     permeabilities : DirectionalPermeabilities, optional
     scene, packing : str, optional
         Names of the files.
     """
     summary = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "scene": scene,
+        "scene": scene and printable(scene),
         "quantities": list(quantities),
-        "packing": {"file": packing, **_packing(mesh)},
+        "packing": {"file": packing and printable(packing), **_packing(mesh)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
         **({} if permeabilities is None else {"permeabilities": vars(permeabilities)}),
+        **sample,
         "seconds": {**seconds, "total": sum(seconds.values())},
         "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
         "units": UNITS,
@@ -94,8 +102,8 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "radii": [packing.radii.min(), packing.radii.max()],
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
-        "porosity_error": packing.porosity_error,
         "pore_volume": packing.porosity * mesh.box.volume,
+        "reading": None if packing.reading is None else packing.reading.as_data(),
     }
 
 
@@ -139,6 +147,8 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             {"region": region_text(fixed.region), "pressure": fixed.pressure, "flow": flux}
             for fixed, flux in zip(flow.fixed_pressures, flow.fixed_pressure_flux, strict=True)
         ]
+    if flow.conductance.name == SectionFriction.name:  # what the range is of
+        found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity

@@ -5,6 +5,7 @@ A directory holds what was asked for of::
     summary.json   numbers of the whole sample, what was done and how long it took
     forces.csv     forces on every sphere, then on the six walls; or forces.npy, forces.parquet
     pores.vtu      the space-filling mesh: pressure, void volume and velocity of the pores
+    profile.csv, pore_sizes.csv, constriction_sizes.csv, planes.csv   the tables of these quantities
     spheres.vtp    centres with radii and forces
     throats.vtp    the network: flux, conductance, hydraulic radius and length of the throats
 """
@@ -12,6 +13,7 @@ A directory holds what was asked for of::
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -19,7 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.errors import InputError
+from porefv.conductance.section_friction.model import SectionFriction
+from porefv.errors import InputError, OutOfRangeWarning
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
 from porefv.flow.directional_permeabilities import (
@@ -30,24 +33,37 @@ from porefv.flow.directional_permeabilities import (
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
+from porefv.results.quantity_tables import (
+    SAMPLE_QUANTITIES,
+    TABLES,
+    TEN_LAYERS,
+    Sections,
+    compute_tables,
+    quantity_summaries,
+    write_tables,
+)
 from porefv.results.summary import summary_json
 from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
 
-QUANTITIES = ("permeability", "permeabilities", "pressure", "forces")
-# What is written unless something else is asked for: all that follows from one flow.
-OF_ONE_FLOW = ("permeability", "pressure", "forces")
-FILES = ("summary.json", *FORCE_FILES.values(), "pores.vtu", "spheres.vtp", "throats.vtp")
+# What `write` computes unless it is told.
+USUAL_QUANTITIES = ("permeability", "pressure", "forces")
+QUANTITIES = ("permeability", "permeabilities", *USUAL_QUANTITIES[1:], *SAMPLE_QUANTITIES)
+FILES = (
+    "summary.json", *FORCE_FILES.values(), *(table.file for table in TABLES.values()),
+    "pores.vtu", "spheres.vtp", "throats.vtp",
+)  # fmt: skip
 
 
 def write(
     flow: PoreFlow,
     directory: str | PathLike[str],
     *,
-    quantities: Collection[str] = OF_ONE_FLOW,
+    quantities: Collection[str] = USUAL_QUANTITIES,
     vtk: bool = True,
     table_format: str = "csv",
+    sections: Sections = TEN_LAYERS,
     force: bool = False,
 ) -> Path:
     """Compute what is asked for, as far as it is not yet, and write a results directory.
@@ -64,6 +80,8 @@ def write(
         Write pores.vtu, spheres.vtp and throats.vtp.
     table_format : str
         Of the table of forces: "csv", "npy" (an array of NumPy, as `Results.forces` is) or "parquet".
+    sections : Sections
+        Layers of the profile, and planes.
     force : bool
         Replace results that exist.
 
@@ -77,7 +95,7 @@ def write(
         raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     with writing(directory, force=force, vtk=vtk, table_format=table_format) as folder:
         save(
-            folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format,
+            folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, sections=sections,
             permeabilities=lambda: directional_permeabilities(
                 flow.mesh, flow.fluid, flow.conductance, slip=slip_of_impervious_walls(flow.walls),
                 solver=flow.solver, tolerance=flow.tolerance,
@@ -126,12 +144,13 @@ def check_target(directory: str | PathLike[str], *, vtk: bool, table_format: str
 
 def stages(quantities: Collection[str], vtk: bool) -> tuple[str, ...]:
     """Stages of `save`, in order."""
-    driven = any(quantity in OF_ONE_FLOW for quantity in quantities)
+    driven = any(quantity != "permeabilities" for quantity in quantities)
     asked = {
         "throats": driven,
         "pressure": driven,
         "forces": "forces" in quantities,
         "velocities": vtk and "pressure" in quantities,
+        "quantities": bool(set(quantities) & set(SAMPLE_QUANTITIES)),
         "permeabilities": "permeabilities" in quantities,
     }
     return ("triangulation", *(stage for stage, wanted in asked.items() if wanted), "writing")
@@ -145,6 +164,7 @@ def save(
     quantities: Collection[str],
     vtk: bool,
     table_format: str,
+    sections: Sections = TEN_LAYERS,
     progress: Progress | None = None,
     permeabilities: Callable[[], DirectionalPermeabilities] | None = None,
     scene: str | None = None,
@@ -159,7 +179,7 @@ def save(
     mesh : PoreMesh
     flow : PoreFlow or None
         None: the mesh alone.
-    quantities, vtk, table_format
+    quantities, vtk, table_format, sections
         As for `write`.
     progress : Progress, optional
         Has the stages that `stages` returns; quiet by default.
@@ -169,6 +189,9 @@ def save(
         Names of the files, for summary.json.
     """
     progress = progress or Progress(quiet=True)
+    tables, sample = {}, {}
+    if flow is not None:
+        sections.check(quantities, flow.walls, mesh.box)
     with progress.stage("triangulation"):
         mesh.n_pores  # noqa: B018 - computed here
     if flow is not None:
@@ -182,6 +205,10 @@ def save(
         if vtk and "pressure" in quantities:
             with progress.stage("velocities"):
                 flow.pore_velocity  # noqa: B018
+        if set(quantities) & set(SAMPLE_QUANTITIES):
+            with progress.stage("quantities"):
+                tables = compute_tables(flow, quantities, sections)
+                sample = quantity_summaries(flow, quantities, tables, sections)
     along_axes = None
     if permeabilities is not None and "permeabilities" in quantities:
         with progress.stage("permeabilities"):
@@ -189,17 +216,20 @@ def save(
     with progress.stage("writing"):
         if flow is not None and "forces" in quantities:
             write_forces(flow, folder / FORCE_FILES[table_format])
+        write_tables(tables, folder)
         if vtk:
             _write_vtk(folder, mesh, flow, quantities)
+    if flow is not None and flow.conductance.name == SectionFriction.name and (said := flow.reliability.warning):
+        warnings.warn(said, OutOfRangeWarning, stacklevel=2)
     text = summary_json(
         mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds,
-        permeabilities=along_axes, scene=scene, packing=packing,
+        sample=sample, permeabilities=along_axes, scene=scene, packing=packing,
     )  # fmt: skip
     (folder / "summary.json").write_text(text, encoding="utf-8")
 
 
 def _write_vtk(folder: Path, mesh: PoreMesh, flow: PoreFlow | None, quantities: Collection[str]) -> None:
-    pores = {"volume": mesh.pore_volumes}
+    pores = {"volume": mesh.pore_volumes, "walls": mesh.pore_walls}
     throats = {
         "length": mesh.throats.lengths,
         "area": mesh.throats.areas,

@@ -22,6 +22,7 @@ from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.packing import Packing
+from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.errors import refused
 from porefv.scenes.region_tables import FixedPressureTable, SourceTable
@@ -35,7 +36,7 @@ from porefv.scenes.shared_tables import (
     SixWalls,
 )
 from porefv.scenes.table import MadeFrom, Scene, Table
-from porefv.scenes.values import Choice, Choices, Limits, ScenePath, Vector, key
+from porefv.scenes.values import Choice, Choices, Limits, Numbers, ScenePath, Vector, Whole, key
 from porefv.solvers.solver import SOLVERS, TOLERANCE
 from porefv.system.progress import Progress
 from porefv.system.tables import TABLE_FORMATS
@@ -127,8 +128,9 @@ class FlowOutput(Table):
     )
     quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
         'what is computed: any of `"permeability"`, `"permeabilities"` (along x, y and z, see '
-        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`. An empty list '
-        "computes the pores alone",
+        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`, and of the '
+        '[quantities of the sample](quantities.md) `"profile"`, `"pore_sizes"`, `"constriction_sizes"`, '
+        '`"tortuosity"`, `"velocity"`, `"planes"`. An empty list computes the pores alone',
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
@@ -137,6 +139,18 @@ class FlowOutput(Table):
         "pyarrow",
         "csv",
     )
+    axis: Annotated[str, Choice(("x", "y", "z"))] | None = key(
+        'axis normal to the layers and planes: `"x"`, `"y"` or `"z"`', None, shown="the axis of flow"
+    )
+    layers: Annotated[int, Whole(least=1)] = key('number of equally thick layers of `"profile"`', 10)
+    planes: Annotated[tuple[float, ...], Numbers("a list of finite numbers such as [0.25, 0.5]")] | None = key(
+        'places of `"planes"` along the axis, inside the box', None, unit="m", shown="between the layers"
+    )
+
+    @property
+    def sections(self) -> Sections:
+        """Layers and planes."""
+        return Sections(self.axis, self.layers, self.planes)
 
 
 class FlowScene(Scene):
@@ -200,8 +214,8 @@ class FlowScene(Scene):
                 f"no wall has a pressure, and {', '.join(self.driven)} cannot be computed without. "
                 "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
             )
+        axis, pressures = self.walls.axis, self.walls.pressures
         if "permeability" in asked:
-            axis, pressures = self.walls.axis, self.walls.pressures
             described = ", ".join(f"{name} at {condition_text(vars(wall))}" for name, wall in passed)
             if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
                 raise refused(
@@ -213,6 +227,17 @@ class FlowScene(Scene):
                     "permeability is that between two walls, without [[sources]] and [[pressures]]. Drop it from the "
                     "quantities, or drop these tables."
                 )
+        for quantity in ("profile", "planes"):
+            if quantity in asked and axis is None and self.output.axis is None:
+                raise refused(
+                    f"{quantity} needs an axis, and the pressure walls are not one pair of opposite walls. "
+                    'Give in [output] for instance\naxis = "y"'
+                )
+        if "tortuosity" in asked and (axis is None or self.sources or self.pressures):
+            raise refused(
+                "tortuosity needs exactly two pressure walls, opposite each other, and no regions that drive. "
+                "Change [walls], or drop it from the quantities."
+            )
         return self
 
     @property
@@ -230,13 +255,7 @@ class FlowScene(Scene):
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
-        packing = Packing.read(self.packing.file, format=self.packing.format, box=self.box)
-        if packing.box is None:
-            raise InputError(
-                f"{self.path or 'scene'}: {self.packing.file} holds no box; give one in the scene:\n"
-                "[box]\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]"
-            )
-        return packing
+        return self.packing.read(self.path, self.box)
 
     def pore_mesh(self, packing: Packing | None = None) -> PoreMesh:
         """The mesh of the packing, which is read and validated."""
@@ -295,10 +314,11 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
+            output.sections.check(output.quantities, self.walls, mesh.box)
             flow = self.pore_flow(mesh) if self.driven else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
-                progress=progress, permeabilities=lambda: self.permeabilities(mesh),
+                sections=output.sections, progress=progress, permeabilities=lambda: self.permeabilities(mesh),
                 scene=str(self.path) if self.path else None, packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
@@ -320,4 +340,5 @@ class FlowScene(Scene):
         mesh = self.pore_mesh()
         if self.driven:
             self.pore_flow(mesh)
+        self.output.sections.check(self.output.quantities, self.walls, mesh.box)
         return mesh.packing

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
@@ -14,12 +14,12 @@ from porefv.conductance.registry import MODELS, conductance_model
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.packing.box import WALLS, Box
-from porefv.packing.files.registry import EXTENSIONS
+from porefv.packing.files.registry import FORMATS
+from porefv.packing.packing import Packing
 from porefv.scenes.errors import refused
 from porefv.scenes.table import OneOf, Table
-from porefv.scenes.values import Choice, Limits, ScenePath, Vector, key
+from porefv.scenes.values import Choice, Integer, Limits, ScenePath, Text, Vector, key
 
-FORMATS = tuple(dict.fromkeys(EXTENSIONS.values()))
 CONDUCTANCES = ("auto", *MODELS)
 
 _Condition = TypeVar("_Condition")
@@ -38,16 +38,84 @@ def _existing(path: Path) -> Path:
 ExistingFile = Annotated[ScenePath, AfterValidator(_existing)]
 
 
-class PackingFile(Table):
-    """The packing file, and its format.
+class ColumnsTable(Table):
+    """The columns of the packing file, by their names in its header, or by their places counted from 1, as texts."""
 
-    `format` is None if the extension of the file tells it.
-    """
+    noun: ClassVar[str] = "column"
+
+    x: Text | None = key("column of the coordinate x of centres", None, shown="by its name")
+    y: Text | None = key("column of the coordinate y of centres", None, shown="by its name")
+    z: Text | None = key("column of the coordinate z of centres", None, shown="by its name")
+    radius: Text | None = key("column of the radii", None, shown="by its name")
+    diameter: Text | None = key("instead of `radius`: column of the diameters", None, shown="by its name")
+
+    @classmethod
+    def check_keys(cls, keys: Sequence[str]) -> None:
+        super().check_keys(keys)
+        if "radius" in keys and "diameter" in keys:
+            raise refused("radius and diameter exclude each other", "diameter")
+
+
+class PackingFile(Table):
+    """The packing file, and [how it is read](formats.md)."""
 
     file: ExistingFile = key("path of the packing file")
     format: Annotated[str, Choice(FORMATS)] | None = key(
-        "format of the file: " + ", ".join(f'`"{name}"`' for name in FORMATS), None, shown="by the extension"
+        "[format](formats.md) of the file: " + ", ".join(f'`"{name}"`' for name in FORMATS),
+        None,
+        shown="by the content, then by the extension",
     )
+    columns: ColumnsTable | None = key(
+        'columns of the file, as in `{ x = "X", radius = "R" }`, with the keys `x`, `y`, `z`, `radius` or `diameter`',
+        None,
+        shown="by their names",
+    )
+    radius: Annotated[float, Limits("must be a positive number of m", above=0.0)] | None = key(
+        "radius of all spheres of a file without radii", None, unit="m"
+    )
+    scale: Annotated[float, Limits("must be a positive number of m", above=0.0)] | None = key(
+        "unit of lengths in the file, its box included: the factor by which they are multiplied to be in m",
+        None,
+        unit="m",
+        shown="by the unit that the file states, or 1",
+    )
+    frame: Integer | None = key("frame to read of a file with several: 0 is the first, -1 the last", None, shown="-1")
+    periodic: Annotated[str, Choice(("ignore",))] | None = key(
+        'with `"ignore"`, a periodic packing is read into a box with six walls. Flow near these walls is not that of '
+        "the bulk",
+        None,
+        shown="a periodic packing is an error",
+    )
+
+    def read(self, scene: Path | None, box: Box | None) -> Packing:
+        """The packing in the box given, or else in that of the file.
+
+        Parameters
+        ----------
+        scene : Path or None
+            The scene file, for errors.
+        box : Box or None
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or no box is known.
+        """
+        columns = {} if self.columns is None else {role: name for role, name in self.columns if name is not None}
+        packing = Packing.read(
+            self.file, self.format, box,
+            columns=columns, radius=self.radius, scale=self.scale, frame=self.frame, periodic=self.periodic,
+        )  # fmt: skip
+        if packing.box is None:
+            around = packing.bounding_box
+            lower, upper = (
+                ", ".join(repr(float(f"{c:.12g}")) for c in corner) for corner in (around.lower, around.upper)
+            )
+            raise InputError(
+                f"{scene or 'scene'}: {self.file} holds no box; give one in the scene, such as that of the spheres:\n"
+                f"[box]\nlower = [{lower}]\nupper = [{upper}]"
+            )
+        return packing
 
 
 class PathOrTable:

@@ -14,7 +14,6 @@ from porefv.coupling.exchange import EXCHANGES
 from porefv.coupling.walls_in_time import WallHistory
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
-from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
@@ -39,16 +38,6 @@ Moments = Annotated[
         times=Times,
     ),
 ]
-
-
-class ScaledPackingFile(PackingFile):
-    """The packing file, and the unit of its lengths."""
-
-    scale: Annotated[float, Limits("must be a positive number of m", above=0.0)] = key(
-        "unit of lengths in the file, its box included: the factor by which they are multiplied to be in m",
-        1.0,
-        unit="m",
-    )
 
 
 @dataclass(frozen=True)
@@ -125,7 +114,7 @@ class SimulationScene(Scene):
 
     Attributes
     ----------
-    packing : ScaledPackingFile
+    packing : PackingFile
     box : Box or None
         None: the box is in the packing file [m].
     material : Material
@@ -152,7 +141,7 @@ class SimulationScene(Scene):
     >>> porefv.simulation.run(scene, force=True)  # doctest: +SKIP
     """
 
-    packing: Annotated[ScaledPackingFile, PathOrTable()] = key("the packing file: a path, or the table `[packing]`")
+    packing: Annotated[PackingFile, PathOrTable()] = key("the packing file: a path, or the table `[packing]`")
     box: Annotated[Box, MadeFrom(BoxFromOriginTable)] | None = key(
         "the table `[box]`: the box that confines the packing", None, shown="from the packing file"
     )
@@ -204,16 +193,10 @@ class SimulationScene(Scene):
         """Interval between checkpoints."""
         return self.checkpoint
 
+    def read_packing(self) -> Packing:
+        """The packing, in the scene's box or its own."""
+        return self.packing.read(self.path, self.box)
+
     def grains(self) -> DEM:
         """The grains at the start, between walls that stand."""
-        found = Packing.read(self.packing.file, format=self.packing.format)
-        box = self.box
-        if box is None and found.box is not None:
-            box = Box(self.packing.scale * found.box.lower, self.packing.scale * found.box.upper)
-        if box is None:
-            raise InputError(
-                f"{self.path or 'scene'}: {self.packing.file} holds no box; give one in the scene:\n"
-                "[box]\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]"
-            )
-        packing = Packing(self.packing.scale * found.centres, self.packing.scale * found.radii, box, found.source)
-        return DEM(packing, self.material, gravity=self.gravity, step=self.step)
+        return DEM(self.read_packing(), self.material, gravity=self.gravity, step=self.step)

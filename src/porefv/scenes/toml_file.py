@@ -11,6 +11,9 @@ from typing import Any
 
 from porefv.errors import InputError
 
+# Most bytes of a scene file.
+_LARGEST = 2**26
+
 
 @dataclass(frozen=True)
 class SceneSource:
@@ -40,7 +43,11 @@ class SceneSource:
             If the file cannot be read, or is not TOML.
         """
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            with path.open("rb") as file:
+                content = file.read(_LARGEST + 1)  # devices have no end
+            if len(content) > _LARGEST:
+                raise InputError(f"cannot read the scene {path}: it has more than {_LARGEST >> 20} MiB; is it a scene?")
+            text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not a text file in UTF-8"
             raise InputError(f"cannot read the scene {path}: {reason}") from None

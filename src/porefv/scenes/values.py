@@ -119,6 +119,16 @@ class Whole:
         )  # fmt: skip
 
 
+class AnyWhole:
+    """A whole number, of any sign; 2.0 is one."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.custom_error_schema(
+            core_schema.no_info_before_validator_function(_without_fraction, core_schema.int_schema(strict=True)),
+            custom_error_type=EXPECTED, custom_error_message="a whole number such as 0 or -1",
+        )  # fmt: skip
+
+
 class Choice:
     """One of some texts."""
 
@@ -190,6 +200,8 @@ def _in_folder(text: str, info: core_schema.ValidationInfo) -> Path:
 def _without_zero_byte(text: str) -> str:
     if "\0" in text:
         raise ValueError(f"a zero byte stands in {text!r}, which no name can hold")
+    if "\n" in text or "\r" in text:
+        raise ValueError(f"a line break stands in {text!r}; give a name in one line")
     return text
 
 
@@ -197,5 +209,6 @@ Text = Annotated[str, AfterValidator(_without_zero_byte)]
 ScenePath = Annotated[Path, InFolder()]
 Vector = Annotated[tuple[float, float, float], Numbers("three finite numbers such as [0.0, 0.0, 1.0]", count=3)]
 Seconds = Annotated[float, Limits("must be a positive number of s", above=0.0)]
+Integer = Annotated[int, AnyWhole()]
 Fraction = Annotated[float, Limits("must lie between 0 and 1", above=0.0, below=1.0)]
 Unbalanced = Annotated[float, Limits("must lie between 1e-8 and 1", least=1.0e-8, below=1.0)]

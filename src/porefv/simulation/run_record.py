@@ -197,6 +197,8 @@ def read_record(directory: str | PathLike[str]) -> RunRecord:
         point = content.get("checkpoint")
         if version == 1 and point is not None:
             point["series"] = {name: {"size": size} for name, size in point.pop("sizes").items()}
+        elif point is not None and not all(mark["digest"] for mark in point["series"].values()):
+            raise ValueError("a series has no digest")
         # As JSON: there a dataclass may be a table, where types are taken strictly.
         return TypeAdapter(RunRecord).validate_json(json.dumps(content), strict=True)
     except OSError as error:
@@ -221,7 +223,7 @@ def _must(holds: bool, otherwise: str) -> None:
 
 def is_simulation(directory: str | PathLike[str]) -> bool:
     """Whether a directory holds results of a simulation."""
-    return (Path(directory) / RECORD).is_file()
+    return os.path.isfile(Path(directory) / RECORD)
 
 
 def content_of(directory: Path) -> list[str]:
@@ -254,7 +256,7 @@ def check_directory(directory: Path, force: bool) -> None:
         raise InputError(f"cannot write {directory}: {error.strerror}") from None
     if directory.exists() and not directory.is_dir():
         raise InputError(f"cannot write the directory {directory}: a file of that name exists")
-    if content and RECORD not in content:
+    if content and not (RECORD in content and _is_ours(directory / RECORD)):
         raise InputError(f"{directory} holds files that are not results of porefv simulate. Choose another directory")
     if content and not force:
         raise InputError(
@@ -265,23 +267,35 @@ def check_directory(directory: Path, force: bool) -> None:
         raise InputError(f"cannot write {directory}: {existing} is not a directory that may be written to")
 
 
+def _is_ours(record: Path) -> bool:
+    """Whether a record is of porefv, damaged or not."""
+    try:
+        return FORMAT.encode() in record.read_bytes()
+    except OSError:
+        return False
+
+
 def begin(directory: Path, record: RunRecord) -> None:
     """Make the directory, or remove what an earlier run has written there, and nothing else.
 
     The record is replaced first. Whoever finds it until all is removed knows that nothing beside it is this run's.
     """
+    directory, frames = Path(os.path.realpath(directory)), directory / FRAMES
     try:
         if not directory.exists():
             directory.mkdir()
             sync_directory(directory.parent)
+        if frames.is_symlink() or (frames.exists() and not frames.is_dir()):
+            raise InputError(f"cannot write {frames}: it is a link, or no directory. Remove it")
+        old = [path for path in sorted(frames.glob("*")) if _FRAME.fullmatch(path.name)]
+        old += [directory / name for name in os.listdir(directory) if _CHECKPOINT.fullmatch(name) or name in FILES]
+        for path in old:
+            if path.is_dir() and not path.is_symlink():
+                raise InputError(f"cannot write {path}: it is a directory. Move it")
         record.status = STARTING
         record.write(directory)
-        for path in sorted((directory / FRAMES).glob("*")):
-            if _FRAME.fullmatch(path.name):
-                path.unlink()
-        names = [name for name in os.listdir(directory) if _CHECKPOINT.fullmatch(name)]
-        for name in (*names, *FILES):
-            (directory / name).unlink(missing_ok=True)
+        for path in old:
+            path.unlink()
     except OSError as error:
         raise InputError(f"cannot write {directory}: {error.strerror}") from None
 
@@ -290,9 +304,9 @@ def tidy(directory: Path, checkpoint: CheckpointRecord | None) -> None:
     """Remove what a process that was killed has left: files that are not complete, and checkpoints of no record."""
     for folder in (directory, directory / FRAMES):
         with suppress(OSError):  # what stays does no harm
-            for name in os.listdir(folder):
+            for name in os.listdir(folder) if not folder.is_symlink() or folder == directory else ():
                 stale = _CHECKPOINT.fullmatch(name) and checkpoint is not None and name != checkpoint.file
-                if stale or _is_left_over(name):
+                if (stale and folder == directory) or _is_left_over(name):
                     (folder / name).unlink()
 
 

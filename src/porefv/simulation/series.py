@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.errors import FORCE_OPTION, InputError
+from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
 from porefv.system.atomic_files import atomic_write
 from porefv.system.tables import TABLE_FORMATS, write_table
 
@@ -46,7 +46,7 @@ class SeriesMark:
         """
         try:
             with path.open("rb") as file:
-                content = file.read(self.size)
+                content = file.read(min(self.size, os.fstat(file.fileno()).st_size))
         except OSError as error:
             raise InputError(f"cannot read {path}: {error.strerror}") from None
         if len(content) < self.size:
@@ -117,10 +117,11 @@ def read_table(path: Path) -> np.ndarray:
     Raises
     ------
     InputError
-        If it cannot be read, or is damaged: not a table of numbers, or time goes backwards in it.
+        If it cannot be read, or is damaged: not a table of numbers, or time goes backwards in it. A last line without
+        an end is still being written, and left out.
     """
     try:
-        header, *lines = path.read_text(encoding="utf-8").splitlines()
+        header, *lines = path.read_text(encoding="utf-8").split("\n")[:-1]
         names = header.split(",")
         rows = [tuple(float(cell) if cell else math.nan for cell in line.split(",")) for line in lines]
         table = np.array(rows, dtype=[(name, float) for name in names])
@@ -130,7 +131,10 @@ def read_table(path: Path) -> np.ndarray:
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
     except ValueError as error:
-        raise InputError(f"{path} is damaged: {error}. {_REMEDY}") from None
+        raise InputError(
+            f"{path} is damaged after its last checkpoint: {str(error).rstrip('.')}. Go on from there with "
+            f"{RESUME_OPTION}, or start the run anew"
+        ) from None
 
 
 def copy_tables(directory: Path, table_format: str) -> None:

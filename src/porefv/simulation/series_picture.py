@@ -70,7 +70,8 @@ def series_picture(directory: str | PathLike[str]) -> Any:
     for ax in axes:
         ax.set_axis_off()
     title = Path(record.path).stem if record.path else str(directory)
-    figure.suptitle(f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}")
+    text = f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}"
+    figure.suptitle(text, parse_math=False)
     return figure
 
 
@@ -102,7 +103,7 @@ def _stages(ax: Axes, record: RunRecord) -> None:
     for span in record.spans:
         ax.annotate(
             f" {span.name}", (span.begin, 0.99), xycoords=("data", "axes fraction"),
-            rotation=90, va="top", fontsize=8, color="0.4",
+            rotation=90, va="top", fontsize=8, color="0.4", parse_math=False,
         )  # fmt: skip
 
 
@@ -117,7 +118,10 @@ def _profiles(ax: Axes, profiles: np.ndarray, record: RunRecord, quantity: str) 
     for time in times[np.unique(np.geomspace(1, len(times), _MOMENTS).round().astype(int)) - 1]:
         layers = found[found["time"] == time]
         ax.plot(layers[quantity], 0.5 * (layers["lower"] + layers["upper"]), ".-", label=f"{time:.4g} s")
-    ax.set_xlabel(f"{quantity.replace('_', ' ')} by layer, Pa, in {record.spans[int(found['stage'][0]) - 1].name}")
+    ax.set_xlabel(
+        f"{quantity.replace('_', ' ')} by layer, Pa, in {record.spans[int(found['stage'][0]) - 1].name}",
+        parse_math=False,
+    )
     ax.set_ylabel("place across the layers, m")
     ax.grid(alpha=0.3)
     ax.legend(fontsize=8)

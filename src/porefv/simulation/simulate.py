@@ -15,7 +15,7 @@ import numpy as np
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.walls_in_time import WallHistories
 from porefv.dem.dem import DEM
-from porefv.errors import FORCE_OPTION, ComputationError, InputError
+from porefv.errors import FORCE_OPTION, ComputationError, InputError, printable
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.overlaps import sphere_volumes
@@ -37,7 +37,7 @@ from porefv.simulation.run_record import (
     tidy,
 )
 from porefv.simulation.series import PROFILES, SERIES, Series, copy_tables
-from porefv.system import signals
+from porefv.system import locks, signals
 from porefv.system.atomic_files import locked
 from porefv.system.progress import Progress
 from porefv.system.signals import Terminated
@@ -94,11 +94,11 @@ def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) 
     if record is None:
         check_directory(directory, force or resume)
         dem = scene.grains()
-        record = RunRecord(dict(scene.data), str(scene.path) if scene.path else None, dem.box.size.tolist())
+        record = RunRecord(dict(scene.data), _path_of(scene), dem.box.size.tolist())
         running = _Run(scene, record, dem, None, progress)
     else:
         dem, coupling = record.load(directory, scene.coupling.conductance)
-        record.scene, record.path = dict(scene.data), str(scene.path) if scene.path else None
+        record.scene, record.path = dict(scene.data), _path_of(scene)
         running = _Run(scene, record, dem, coupling, progress)
     try:
         with _interruptions(running):
@@ -111,6 +111,11 @@ def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) 
         raise kind(f"{reason}. {running.stop('failed')}") from error
     finally:
         running.close()
+
+
+def _path_of(scene: SimulationScene) -> str | None:
+    """The path of the scene file, as text that a record can hold whatever bytes it has."""
+    return printable(str(scene.path)) if scene.path else None
 
 
 def check(scene: SimulationScene) -> DEM:
@@ -305,6 +310,7 @@ class _Run:
             ended = self._ended(stage, last, look=strides.due(target, ended=False))
             self._record(k, residual, row=rows.due(target, ended), ended=ended)
             self._show(k, residual)
+            locks.touch()
             if ended:
                 span.end = dem.time
                 if stage.permeameter:

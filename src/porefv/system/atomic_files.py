@@ -1,8 +1,10 @@
 """Files and directories that appear whole or not at all."""
 
+import json
 import os
 import re
 import shutil
+import stat
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -32,6 +34,8 @@ def locked(path: str | PathLike[str]) -> Iterator[None]:
     """
     target = Path(os.path.realpath(path))
     check_is_no_root(path)
+    if os.path.islink(target):
+        raise InputError(f"cannot write {path}: it is a link to itself. Give another place")
     with ExitStack() as stack:
         try:
             stack.enter_context(lock(target))
@@ -51,7 +55,7 @@ def check_is_no_root(path: str | PathLike[str]) -> None:
 def put_back(path: str | PathLike[str]) -> None:
     """Put a directory back that a process was about to replace when it was killed; else, do nothing."""
     target = Path(os.path.realpath(path))
-    if not target.exists() and hidden_sibling(target, "old").exists():
+    if not os.path.lexists(target) and os.path.lexists(hidden_sibling(target, "old")):
         # Where this cannot be written, or another process is about to do the same, it stays as it is.
         with suppress(InputError), locked(target):
             pass
@@ -148,7 +152,8 @@ def atomic_directory(path: str | PathLike[str], force: bool = False) -> Iterator
         except OSError as error:
             raise _cannot_write(path, error) from error
         finally:
-            shutil.rmtree(new, ignore_errors=True)
+            if new.exists():
+                _remove(new)
 
 
 def _check_file(path: str | PathLike[str], target: Path) -> None:
@@ -167,12 +172,33 @@ def _check_directory(path: str | PathLike[str], target: Path, force: bool) -> No
     if not target.is_dir():
         raise InputError(f"cannot write the directory {path}: a file of that name exists.")
     content = os.listdir(target)
-    if content and RESULTS_MARK not in content:
-        raise InputError(f"{path} holds files that are not results of porefv. Choose another directory.")
+    if content and not (RESULTS_MARK in content and _is_ours(target / RESULTS_MARK)):
+        old = hidden_sibling(target, "old")
+        earlier = f" Earlier results are in {old}." if old.exists() else ""
+        raise InputError(f"{path} holds files that are not results of porefv. Choose another directory.{earlier}")
     if content and not force:
         raise InputError(
             f"{path} already holds results. Choose another directory, or replace them with {FORCE_OPTION}."
         )
+    # Found now, not when all is computed.
+    parent = target.parent.stat()
+    if os.path.ismount(target):
+        raise InputError(f"cannot replace {path}: it is a mount point. Give a directory within it.")
+    if not os.access(target, os.W_OK) or (
+        os.name == "posix"
+        and parent.st_mode & stat.S_ISVTX
+        and os.geteuid() not in (0, parent.st_uid, target.stat().st_uid)
+    ):
+        raise InputError(f"cannot replace {path}: it is write-protected, or another user's. Choose another directory.")
+
+
+def _is_ours(mark: Path) -> bool:
+    """Whether the summary of a directory may be one of porefv's: what is damaged may be."""
+    try:
+        found = json.loads(mark.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return True
+    return isinstance(found, dict) and ("versions" in found or found.get("kind") == "trade")
 
 
 def _swap(new: Path, target: Path) -> None:
@@ -182,13 +208,12 @@ def _swap(new: Path, target: Path) -> None:
         os.rename(target, old)
     try:
         os.rename(new, target)
-    except BaseException:
-        if old:
+    finally:  # whatever came: a signal may have come after the renaming
+        if old and not target.exists():
             os.rename(old, target)
-        raise
     sync_directory(target.parent)
     if old:
-        shutil.rmtree(old, ignore_errors=True)
+        _remove(old)
 
 
 def _recover(target: Path) -> None:
@@ -200,12 +225,34 @@ def _recover(target: Path) -> None:
         if not target.exists():
             os.rename(old, target)
         elif (target / RESULTS_MARK).exists():
-            shutil.rmtree(old)
-    if new.exists():
-        shutil.rmtree(new)
+            _remove(old)
+    if os.path.lexists(new):
+        _remove(new)
     for name in os.listdir(target.parent):
         if finished_name(name) == target.stem[:100] + target.suffix and (target.parent / name).is_file():
             (target.parent / name).unlink()
+
+
+def _remove(path: Path) -> None:
+    """Remove what is left of a directory, or what stands in its place.
+
+    Raises
+    ------
+    InputError
+        If it cannot be removed; names it.
+    """
+    try:
+        if path.is_symlink() or not path.is_dir():
+            path.unlink()
+            return
+        for directory, _, _ in os.walk(path):  # from the top: where one is write-protected, it may be unlocked
+            if not os.access(directory, os.W_OK):
+                os.chmod(directory, 0o700)
+        shutil.rmtree(path)
+    except OSError as error:
+        raise InputError(
+            f"cannot remove {path}, which is left of an earlier run: {error.strerror}. Remove it"
+        ) from None
 
 
 def _sync_file(path: Path) -> None:

@@ -3,7 +3,7 @@
 The lock of `results` is a hidden file beside it, `.results.porefv-lock`, that says which process holds it. The system
 locks that file for as long as the process lives, so that nothing has to be cleaned up after a kill: whoever comes next
 takes the lock over. Where a file system knows no locks, or only those of its own host, the file's age decides: who
-holds a lock touches its file every few seconds.
+holds a lock touches its file now and then.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import json
 import os
 import socket
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -28,8 +27,13 @@ try:
 except ImportError:  # not POSIX
     fcntl = None  # type: ignore[assignment]
 
-# Seconds between two touches of the file of a lock, and after how many without one its holder is taken to be gone.
-TOUCHED, GONE = 15.0, 90.0
+# Seconds between two touches of the file of a lock at the least, and after how many without one its holder, on another
+# host, is taken to be gone. The longest time between two touches is that of a stage: 40 s with a million spheres.
+TOUCHED, GONE = 15.0, 600.0
+
+# When each lock that this process holds was last touched, by its file.
+_HELD: dict[Path, float] = {}
+
 # Most bytes read of the file of a lock.
 _MOST = 4096
 
@@ -55,14 +59,11 @@ def lock(target: Path) -> Iterator[None]:
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         file = _taken(path, target)
-        ended = threading.Event()
-        touching = threading.Thread(target=_touch, args=(path, ended), name="porefv-lock", daemon=True)
-        touching.start()
+        _HELD[path] = time.monotonic()
         try:
             yield
         finally:
-            ended.set()
-            touching.join()
+            del _HELD[path]
             # Removed while it is held: who waits for this very file sees that it is not there any more.
             with suppress(OSError):
                 path.unlink()
@@ -71,6 +72,16 @@ def lock(target: Path) -> Iterator[None]:
         for parent in made:
             with suppress(OSError):
                 parent.rmdir()
+
+
+def touch() -> None:
+    """Say that the locks that this process holds are still held; called on the way through long computations."""
+    now = time.monotonic()
+    for path, before in list(_HELD.items()):
+        if now - before > TOUCHED:
+            _HELD[path] = now
+            with suppress(OSError):
+                os.utime(path)
 
 
 def hidden_sibling(target: Path, ending: str) -> Path:
@@ -93,12 +104,14 @@ def _taken(path: Path, target: Path) -> int:
             if not _is_still(file, path):  # its holder has removed it meanwhile
                 os.close(file)
                 continue
-            # Had a holder lived that the system's lock held for, the lock would not be ours.
             holder = _holder(file)
-            gone = locked and holder.get("locked") is True and holder.get("host") == socket.gethostname()
-            if holder and not gone and _age(file, path.parent) < GONE:
+            if holder and not _is_gone(holder, locked is True) and _age(file, path.parent) < GONE:
                 raise _held(target, holder)
-            _describe(file, locked is True)
+            try:
+                _describe(file, locked is True)
+            except BaseException:  # the disk is full, say
+                path.unlink(missing_ok=True)
+                raise
             return file
         except BaseException:
             _release(file)
@@ -125,6 +138,23 @@ def _release(file: int) -> None:
             fcntl.flock(file, fcntl.LOCK_UN)
     with suppress(OSError):
         os.close(file)
+
+
+def _is_gone(holder: dict[str, Any], locked: bool) -> bool:
+    """Whether a holder is known to be gone; of other hosts that is not known."""
+    if holder.get("host") != socket.gethostname():
+        return False
+    if locked and holder.get("locked") is True:
+        return True  # had it lived, the lock of the system would not be ours
+    if os.name != "posix" or not isinstance(holder.get("process"), int):
+        return False
+    try:
+        os.kill(holder["process"], 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
 
 
 def _is_still(file: int, path: Path) -> bool:
@@ -177,9 +207,3 @@ def _held(target: Path, holder: dict[str, Any]) -> InputError:
     if holder:
         who = f"process {holder.get('process')} on {holder.get('host')}, since {holder.get('since')}"
     return InputError(f"{target} is being written by {who}. Wait for its end, or choose another place for the results")
-
-
-def _touch(path: Path, ended: threading.Event) -> None:
-    while not ended.wait(TOUCHED):
-        with suppress(OSError):
-            os.utime(path)

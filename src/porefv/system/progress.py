@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from porefv.system import locks
 from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class Progress:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time a stage, and show it while it lasts."""
+        locks.touch()
         with Timer(self.seconds, name):
             if not self.draws:
                 yield

@@ -53,9 +53,23 @@ def test_box_and_metadata_read_back(tmp_path):
         "x\ty\tz\tradius\n1\t2\t3\t4\n5\t6\t7\t8\n",
         '"x", "y", "z", "Radius"\n"1", 2, 3, 4e0\n5,6,7,+8\n',
         'id,kind,x,y,z,note,radius\n7,sand,1,2,3,"a, b",4\n8,,5,6,7,,8\n',
+        "# x,y,z,radius\n1,2,3,4\n5,6,7,8\n",
+        "1,2,3,4\n5,6,7,8\n",
         "# a comment\n\nx,y,z,radius\n# another = one\n1,2,3,4\n\n   \n5,6,7,8\n\n",
     ],
-    ids=["plain", "r", "bom_crlf", "cr", "semicolon", "tab", "quoted", "extra_columns", "comments"],
+    ids=[
+        "plain",
+        "r",
+        "bom_crlf",
+        "cr",
+        "semicolon",
+        "tab",
+        "quoted",
+        "extra_columns",
+        "header_in_comment",
+        "no_header",
+        "comments",
+    ],
 )
 def test_accepted_forms(read, content):
     packing = read(content)
@@ -86,10 +100,11 @@ def test_a_bad_box_is_refused(error, comments, said):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("a,b,c,d\n1,2,3,4\n", ", line 1: the header 'a,b,c,d' lacks x, y, z, radius"),
-        ("# x,y,z,radius\n1,2,3,4\n", ", line 2: the header '1,2,3,4' lacks x, y, z, radius"),
+        ("a,b,c,w\n1,2,3,4\n", ", line 1: the header 'a,b,c,w' lacks x, y, z, radius (or diameter)."),
+        ("# x,y,z,r\n1,2,3,4,5\n", ", line 2: 5 columns without names"),
         ("x,y,radius\n1,2,4\n", ", line 1: the header 'x,y,radius' lacks z"),
-        ("x,y,z,radius,r\n1,2,3,4,4\n", ", line 1: the header has two columns for radius"),
+        ("x,y,z,radius,r\n1,2,3,4,5\n", ", line 1: the columns 'radius' and 'r' disagree about radius"),
+        ("x,y,z,w\n1,2,3,4\n", ", line 1: the columns are 'x,y,z,w', and there is no radius or diameter"),
         ("x,y,z,radius\n", ": there are no spheres after line 1"),
         ("# nothing\n# here\n", ": only comments"),
     ],

@@ -1,6 +1,10 @@
+import re
+import warnings
+
 import numpy as np
 import pytest
 
+from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.packing import Packing
 
 DATA = """LAMMPS data file, any title: Atoms
@@ -31,7 +35,7 @@ Velocities
 """
 
 
-def frame(step, radius, columns="id type x y z radius", bounds="pp ff mm"):
+def frame(step, radius, columns="id type x y z radius", bounds="ff fs mm"):
     return f"""ITEM: TIMESTEP
 {step}
 ITEM: NUMBER OF ATOMS
@@ -50,9 +54,9 @@ ITEM: ATOMS {columns}
 def read(tmp_path):
     """Read a LAMMPS file with this content."""
 
-    def reader(content):
+    def reader(content, **options):
         (tmp_path / "grains.lammps").write_text(content)
-        return Packing.read(tmp_path / "grains.lammps")
+        return Packing.read(tmp_path / "grains.lammps", **options)
 
     return reader
 
@@ -81,7 +85,7 @@ def test_a_data_file_without_box_or_hint_is_read(read):
         ("Atoms  # sphere", "Ellipsoids", ": not a LAMMPS data file"),
         ("0 2.5 ylo yhi", "0 two ylo yhi", ", line 7: '0 two' are not two numbers"),
         ("0 2.5 ylo yhi", "2 2 ylo yhi", ": the box has size 0 m along y"),
-        ("Masses", "0 0 0 xy xz yz", ", line 10: the box is tilted"),
+        ("Masses", "0 0.1 0 xy xz yz", ", line 10: the box is tilted"),
         ("0.7 0.8 0.9 0 0 0", "0.7 0.8", ", line 16: 6 cells where atom_style sphere has 7"),
         ("0.1 0.2 0.3 0 0 0", "0.1 0.2 0.3", ", line 17: 7 cells instead of 10"),
         ("2 1 0.2 2500", "2 1 big 2500", ", line 19: diameter is 'big', not a number"),
@@ -127,17 +131,22 @@ def test_a_dump_is_known_by_its_content_and_may_hold_units_and_time(read):
     ("content", "said"),
     [
         (frame(0, 0.1)[:-24], ", line 10: 2 atoms declared, 1 given. Was the file cut off?"),
-        (frame(0, 0.1) + frame(1, 0.1)[:41], ": the last frame lacks ITEM: BOX BOUNDS"),
-        (frame(0, 0.1) + "ITEM: TIMESTEP\n", ": the last frame lacks ITEM: NUMBER OF ATOMS"),
+        (frame(1, 0.1)[:41], ": the last frame lacks ITEM: BOX BOUNDS"),
+        ("ITEM: TIMESTEP\n", ": the last frame lacks ITEM: NUMBER OF ATOMS"),
         (frame(0, 0.1).replace("ATOMS\n2", "ATOMS\ntwo"), ", line 4: 'two' is not a number of atoms"),
         (frame(0, 0.1).replace("0 2\n", "0\n"), ", line 7: two numbers, lower and upper, are expected"),
         (frame(0, 0.1).replace("0 2\n", "2 0\n"), ": the box has size -2 m along y"),
-        (frame(0, 0.1, bounds="xy xz yz pp pp pp"), ", line 5: the box is tilted"),
-        (frame(0, 0.1, columns="id type x y z mass"), ", line 9: the columns 'id type x y z mass' lack"),
+        (frame(0, 0.1, bounds="xy xz yz pp pp pp"), ", line 6: three numbers, lower, upper and tilt"),
+        (frame(0, 0.1, bounds="abc origin pp pp pp"), ", line 5: the box is tilted"),
         (
-            frame(0, 0.1, columns="type mol x y z radius"),
-            ", line 9: the columns 'type mol x y z radius' lack",
+            frame(0, 0.1, bounds="xy xz yz ff ff ff")
+            .replace("0 4\n", "0 4 0\n")
+            .replace("-1 1\n", "-1 1 0.5\n")
+            .replace("0 2\n", "0 2 0\n"),
+            ", line 6: the box is tilted",
         ),
+        (frame(0, 0.1, bounds="ff pp mm"), ", line 5: the packing is periodic along y (BOX BOUNDS ff pp mm)"),
+        (frame(0, 0.1, columns="id type x y z mass"), ", line 9: the columns 'id type x y z mass' lack"),
         (frame(0, 0.1, columns="id x y z radius"), ", line 10: 6 cells instead of 5"),
         (frame(0, 0.1).replace("2 1 0.5", "nan 1 0.5"), ", line 10: atom id nan is not a whole number"),
         (frame(0, 0.1).replace("2 1 0.5", "1e99 1 0.5"), ", line 10: atom id 1e+99 is not a whole number"),
@@ -148,3 +157,111 @@ def test_a_dump_is_known_by_its_content_and_may_hold_units_and_time(read):
 )
 def test_a_bad_dump_is_refused_by_its_line(error, content, said):
     assert said in error(content)
+
+
+@pytest.mark.parametrize(
+    ("units", "metres"),
+    [
+        ("si", 1.0),
+        ("cgs", 1e-2),
+        ("micro", 1e-6),
+        ("nano", 1e-9),
+        ("metal", 1e-10),
+        ("real", 1e-10),
+        ("electron", 5.29177210903e-11),
+    ],
+)
+def test_units_are_converted_with_the_box(read, units, metres):
+    dump = read(f"ITEM: UNITS\n{units}\n" + frame(0, 0.1) + frame(1, 0.1))  # LAMMPS states them once
+    data = read(DATA.replace("any title", f"version 1, timestep = 0, units = {units}"))
+    for packing, radius, upper in ((dump, 0.1, [1, 2, 4]), (data, 0.05, [1, 2.5, 10])):
+        assert packing.radii[0] == pytest.approx(radius * metres, rel=1e-15)
+        np.testing.assert_allclose(packing.box.upper, np.array(upper) * metres, rtol=1e-15)
+        assert packing.reading.scale == metres and packing.reading.units.startswith(units)
+
+
+@pytest.mark.parametrize("units", ["lj", "furlongs"])
+def test_units_without_a_length_in_metres_need_a_scale(read, units):
+    content = f"ITEM: UNITS\n{units}\n" + frame(0, 0.1)
+    with pytest.raises(InputError, match=rf"line 2: lengths are in '{units}'.* Give the length of this unit .* scale"):
+        read(content)
+    packing = read(content, scale=1e-3)
+    np.testing.assert_array_equal(packing.radii, 1e-4)
+    np.testing.assert_array_equal(packing.box.upper, [1e-3, 2e-3, 4e-3])
+
+
+def test_a_scale_other_than_the_stated_unit_is_told(read):
+    content = "ITEM: UNITS\ncgs\n" + frame(0, 0.1)
+    with pytest.warns(PackingFileWarning, match="line 2: scale 1 is used instead of the stated unit cgs"):
+        packing = read(content, scale=1.0)
+    assert packing.radii[0] == 0.1 and "scale 1 is used instead" in str(packing.reading)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(content, scale=0.01).radii[0] == 0.001
+
+
+def test_frame_chooses_among_frames(read):
+    content = frame(0, 0.1) + "ITEM: TIME\n0.5\n" + frame(100, 0.2) + "ITEM: TIME\n1\n" + frame(200, 0.3)
+    for number, radius in ((None, 0.3), (-1, 0.3), (2, 0.3), (0, 0.1), (1, 0.2), (-3, 0.1)):
+        packing = read(content, frame=number)
+        assert packing.radii[0] == radius and packing.reading.frames == 3
+    with pytest.raises(InputError, match=r"frame 3 is asked for, and the file has 3 frames, 0 to 2 \(-1 is the last\)"):
+        read(content, frame=3)
+    with pytest.raises(InputError, match="frame -2 is asked for, and the file has one frame, 0"):
+        read(frame(0, 0.1), frame=-2)
+
+
+@pytest.mark.parametrize("lost", [1, 2, 20, 60, 100, *range(130, len(frame(1, 0.25)))])
+def test_a_last_frame_that_is_cut_off_is_left_out_and_told(read, lost):
+    whole = frame(0, 0.1)
+    with pytest.warns(PackingFileWarning, match="line .*: the last frame is cut off, and the whole one before it"):
+        packing = read((whole + frame(1, 0.25))[:-lost])
+    assert packing.radii[0] == 0.1 and packing.reading.frames == 1
+    assert "the last frame is cut off" in str(packing.reading)
+
+
+def test_a_dump_without_ids_is_in_the_order_of_the_file(read):
+    packing = read(frame(0, 0.1, columns="mol type x y z radius"))
+    np.testing.assert_array_equal(packing.centres[:, 0], [0.5, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("columns", "missing"),
+    [
+        ("id type x y z mass", "lack radius (or diameter)."),
+        ("id type x y vz radius", "lack x y z (or xu, xs, xsu)."),
+    ],
+)
+def test_a_missing_column_is_named_alone(error, columns, missing):
+    assert missing in error(frame(0, 0.1, columns=columns))
+
+
+def test_columns_of_a_dump_can_be_mapped_and_a_radius_given(read):
+    content = frame(0, 0.1, columns="id type x y z f_size")
+    assert read(content, columns={"diameter": "f_size"}).radii[0] == 0.05
+    assert read(content, radius=0.2).radii[0] == 0.2
+    scaled = frame(0, 0.1, columns="id type xs b zs radius")
+    np.testing.assert_array_equal(
+        read(scaled, columns={"x": "xs", "y": "b", "z": "zs"}).centres[0], [-1 + 0.25 * 2, 0.5, 0.125 * 4]
+    )
+
+
+@pytest.mark.parametrize(("bounds", "axes"), [("pp ff ff", "x"), ("ff pp pp", "y, z"), ("pp pp pp", "x, y, z")])
+def test_periodic_axes_are_refused_or_ignored_by_name(read, error, bounds, axes):
+    said = error(frame(0, 0.1, bounds=bounds))
+    assert said.startswith(f", line 5: the packing is periodic along {axes} (BOX BOUNDS {bounds}), and porefv has no")
+    assert re.search('Give periodic = "ignore"', said)
+    packing = read(frame(0, 0.1, bounds=bounds), periodic="ignore")
+    assert packing.reading.periodicity.startswith(f"periodic along {axes}") and packing.box.volume == 16
+
+
+def test_bounds_without_flags_are_not_periodic(read):
+    assert read(frame(0, 0.1, bounds="")).reading.periodicity == ""
+
+
+def test_a_tilt_of_zero_is_no_tilt(read):
+    content = frame(0, 0.1, bounds="xy xz yz ff ff ff")
+    for side in ("-1 1", "0 2", "0 4"):
+        content = content.replace(f"{side}\n", f"{side} 0.0\n", 1)
+    assert read(content).box.volume == 16
+    assert read(DATA.replace("Masses", "0 0 0 xy xz yz\n\nMasses")).box.volume == 50

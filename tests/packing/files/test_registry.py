@@ -9,12 +9,12 @@ import pytest
 
 from porefv.errors import InputError, MissingExtraError
 from porefv.packing.box import Box
-from porefv.packing.files.registry import EXTENSIONS, read_packing, write_packing
+from porefv.packing.files.detection import EXTENSIONS
+from porefv.packing.files.registry import FORMATS, read_packing, write_packing
 from porefv.packing.packing import Packing
 
 PACKING = Packing([[0.1, 0.2, 0.3], [0.7, 1 / 3, 0.5]], [0.05, 0.1], Box([0, 0, 0], [1, 2, 3]))
-TEXT_FORMATS = ("csv", "yade", "lammps")
-FORMATS = (*TEXT_FORMATS, "vtk")
+TEXT_FORMATS = ("csv", "yade", "lammps", "mercury", "esys", "xyz")
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.CSV", "a.txt", "a.spheres", "a.vtp"])
@@ -45,16 +45,20 @@ def test_the_box_given_overrides_the_one_in_the_file(tmp_path):
 
 
 def test_unknown_extensions_and_formats_are_refused_with_the_known_ones(tmp_path):
-    for ask in (lambda: read_packing("a.xyz"), lambda: write_packing(PACKING, tmp_path / "a")):
-        with pytest.raises(InputError, match=r"(?s)\.csv.*format as one of csv, yade"):
-            ask()
+    (tmp_path / "b.stl").write_bytes(b"\0\1\2")
+    with pytest.raises(InputError, match=r"b.stl: neither the content nor the extension '.stl'.*\.csv"):
+        read_packing(tmp_path / "b.stl")
+    with pytest.raises(InputError, match=r"\.csv.*format as one of csv, yade"):
+        write_packing(PACKING, tmp_path / "a")
     with pytest.raises(InputError, match="'stl' cannot be read. Give one of csv, yade, lammps, vtk"):
         read_packing("a.csv", format="stl")
     with pytest.raises(InputError, match="lammps.*cannot be written"):
         write_packing(PACKING, tmp_path / "a", format="lammps")
     with pytest.raises(InputError, match=".data"):
         write_packing(PACKING, tmp_path / "a.data")
-    assert os.listdir(tmp_path) == [] and set(EXTENSIONS.values()) == set(FORMATS)
+    with pytest.raises(InputError, match="tells no format"):
+        write_packing(PACKING, tmp_path / "a.csv.gz")
+    assert os.listdir(tmp_path) == ["b.stl"] and set(EXTENSIONS.values()) <= set(FORMATS)
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -97,6 +101,7 @@ VALID = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::porefv.errors.PackingFileWarning")
 @pytest.mark.parametrize("format", VALID)
 def test_a_damaged_file_gives_a_packing_or_an_error_that_names_it(tmp_path, format):
     path, valid = tmp_path / "damaged", VALID[format]

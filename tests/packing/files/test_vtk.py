@@ -1,7 +1,9 @@
+import gzip
+
 import numpy as np
 import pytest
 
-from porefv.errors import InputError
+from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
 
@@ -75,8 +77,8 @@ def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, poin
             Packing.read(tmp_path / "a.vtp")
         return str(caught.value)
 
-    points.point_data["diameter"] = [0.1, 0.2]
-    assert "there are 2" in error()
+    points.point_data["diameter"] = [0.1, 0.4]
+    assert "the columns 'radius' and 'diameter' disagree" in error()
     del points.point_data["diameter"]
     points.point_data["radius"] = [0.1, -0.1]
     assert "sphere 1: radius -0.1" in error()
@@ -84,7 +86,7 @@ def test_missing_or_wrong_arrays_are_refused_with_those_there_are(tmp_path, poin
     assert "must have one component" in error()
     del points.point_data["radius"]
     points.point_data["mass"] = [1, 2]
-    assert "there are 0. Point data: 'mass'" in error()
+    assert "point data: 'mass', and there is no radius" in error()
     points.point_data["radius"] = [0.1, 0.1]
     points.field_data["box_upper"] = [1.0, 0.0, 1.0]
     assert "the box has size 0 m along y" in error()
@@ -120,3 +122,18 @@ def test_another_data_set_is_refused(tmp_path):
     pyvista.MultiBlock([pyvista.Sphere()]).save(tmp_path / "a.vtm")
     with pytest.raises(InputError, match="a.vtm"):
         Packing.read(tmp_path / "a.vtm", format="vtk")
+
+
+def test_the_array_of_the_radius_can_be_mapped_and_lengths_scaled(tmp_path, points):
+    points.point_data["size"] = [0.2, 0.4]
+    points.point_data["x"] = [7.0, 8.0]  # no coordinate
+    points.save(tmp_path / "a.vtp")
+    packing = Packing.read(tmp_path / "a.vtp", columns={"diameter": "size"}, scale=10.0)
+    np.testing.assert_allclose(packing.radii, [1.0, 2.0], rtol=1e-15)
+    np.testing.assert_allclose(packing.centres, 10 * CENTRES, rtol=1e-15)
+    with pytest.raises(InputError, match="the points of a VTK file are the centres"):
+        Packing.read(tmp_path / "a.vtp", columns={"x": "size"})
+    with pytest.warns(PackingFileWarning, match="the radius given is used"):
+        assert Packing.read(tmp_path / "a.vtp", radius=0.3).radii[0] == 0.3
+    (tmp_path / "a.vtp.gz").write_bytes(gzip.compress((tmp_path / "a.vtp").read_bytes()))
+    assert len(Packing.read(tmp_path / "a.vtp.gz")) == 2

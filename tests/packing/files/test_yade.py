@@ -25,6 +25,8 @@ def read(tmp_path):
         "1 2 3 4\n5 6 7 8\n",
         "#format x_y_z_r\n1\t2\t3\t4\n5\t6\t7\t8\n",
         "#format x_y_z_r_matId\n1 2 3 4 0\n5 6 7 8 0\n",
+        "x y z r\n1 2 3 4\n5 6 7 8\n",
+        "x,y,z,radius\n1,2,3,4\n5,6,7,8\n",
         "#format id_x_y_z_r\n0 1 2 3 4\n1 5 6 7 8\n",
         "#format x_y_z_r_attrs\n1 2 3 4 sand 0.1\n5 6 7 8 silt 0.2\n",
         "# by hand\n  1 2   3 4\n\n# more\n5 6 7 8",
@@ -51,11 +53,11 @@ def test_what_is_written_is_what_yade_reads(tmp_path):
     [
         ("1 2 3 4\n5 6 seven 8\n", "line 2: z is 'seven', not a number"),
         ("1 2 3 4\n\n5 6 7\n", "line 3: 3 cells instead of 4"),
-        ("1 2 3 4 5\n", "line 1: 5 cells instead of 4"),
+        ("1 2 3 4 5\n", "line 1: 5 columns without names are neither clearly"),
+        ("1 2 3 4 5 6\n", "line 1: 6 columns without names"),
         ("# c\n1 2 3 4\n5 6 7 0\n", r"line 3 \(sphere 1\): radius 0"),
         ("1 2 nan 4\n", r"line 1 \(sphere 0\)"),
-        ("x,y,z,radius\n1,2,3,4\n", "line 1: .* give format 'csv'"),
-        ("#format x_y_z\n1 2 3\n", "line 1: the format x_y_z lacks"),
+        ("#format x_y_z\n1 2 3\n", "line 1: the format 'x_y_z' lacks"),
         ("# nothing\n", "only comments"),
     ],
 )

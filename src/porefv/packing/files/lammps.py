@@ -1,20 +1,32 @@
-"""LAMMPS: data files of atom_style sphere, and text dumps. Units are taken as SI (LAMMPS's ``units si``).
+"""LAMMPS and LIGGGHTS: data files of atom_style sphere (granular), and text dumps.
 
-Spheres are sorted by atom id: LAMMPS writes atoms in an order that changes from step to step. Of a dump with
-several frames the last is read. Periodic boundaries are not known here: the box has six walls.
+Spheres are sorted by atom id where there are ids: LAMMPS writes atoms in an order that changes from step to step.
+A dump may hold several frames. The units come from ``ITEM: UNITS`` of a dump, or ``units = cgs`` in the title of a
+data file.
 """
 
+from __future__ import annotations
+
 import re
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.box import Box
-from porefv.packing.files.text import AnyPath, Rows, make_box, quoted, read_lines
-from porefv.packing.packing import Packing, Source
+from porefv.packing.files.column_names import Column, chosen_columns, positions, recognised, spheres
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity
+from porefv.packing.files.frames import chosen_frame, warn_cut_off
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, text_lines
 
-_STYLES = ("", "sphere")  # what may follow "Atoms #" in a data file
+# Unit of length, and its size in m, by the name of LAMMPS's system of units.
+UNITS = {
+    "si": ("m", 1.0), "cgs": ("cm", 1e-2), "micro": ("µm", 1e-6), "nano": ("nm", 1e-9), "metal": ("Å", 1e-10),
+    "real": ("Å", 1e-10), "electron": ("Bohr", 5.29177210903e-11), "lj": ("sigma", None),
+}  # fmt: skip
+
+_STYLES = ("", "sphere", "granular")  # what may follow "Atoms #" in a data file
 
 # What a frame of a dump must hold; the first that occurs in a line names the item.
 _ITEMS = ("NUMBER OF ATOMS", "BOX BOUNDS", "ATOMS")
@@ -25,14 +37,19 @@ _COUNT = re.compile("[0-9]{1,15}")
 _PLAIN, _SCALED = ("{}", "{}u"), ("{}s", "{}su")
 
 
-def read(path: AnyPath) -> Packing:
+def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     """Read a data file or a dump, told apart by their content; errors name the file and the line."""
-    lines = read_lines(path)
+    lines = text_lines(path, content)
     first = next((line for line in lines if line.strip()), "")
-    return _read_dump(path, lines) if first.startswith("ITEM:") else _read_data(path, lines)
+    return _read_dump(path, lines, options) if first.startswith("ITEM:") else _read_data(path, lines, options)
 
 
-def _read_data(path: AnyPath, lines: list[str]) -> Packing:
+def _unit(path: AnyPath, line: int, name: str) -> LengthUnit:
+    unit, metres = UNITS.get(name, ("", None))
+    return LengthUnit(f"{name} ({unit})" if metres is not None else name, metres, f"{path}, line {line}")
+
+
+def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileContent:
     texts = [line.partition("#")[0].strip() for line in lines]
     try:
         start = texts.index("Atoms", 1)
@@ -41,8 +58,12 @@ def _read_data(path: AnyPath, lines: list[str]) -> Packing:
     style = lines[start].partition("#")[2].strip()
     if style not in _STYLES:
         raise InputError(f"{path}, line {start + 1}: atom_style {quoted(style)} is not read. Use sphere.")
-    # Line 1 is a title that LAMMPS ignores, whatever it says.
-    number, box = _data_header(path, texts[1:start])
+    chosen_frame(path, 1, options)
+    if options.columns or options.radius is not None:
+        raise InputError(f"{path}: a LAMMPS data file has columns of its own. Drop columns and radius.")
+    # Of the title, line 1, LAMMPS reads only the units that it may state.
+    title = re.search(r"\bunits\s*=\s*(\w+)", lines[0])
+    number, corners = _data_header(path, texts[1:start])
     rows = Rows(path, texts[start + 1 :], first=start + 2)
     end = next((k for k, text in enumerate(rows.texts) if text[0].isalpha()), len(rows.texts))
     _check_number(path, number, end, rows.numbers[end - 1] if end else start + 1)
@@ -54,93 +75,190 @@ def _read_data(path: AnyPath, lines: list[str]) -> Packing:
             "density x y z), or 10 with image flags."
         )
     values, numbers = rows.columns({"id": 0, "x": 4, "y": 5, "z": 6, "diameter": 2}, cells)
-    values[:, 4] /= 2
-    return _packing(path, values, numbers, box)
+    order = _by_id(path, values[:, 0], numbers)
+    values = values[order]
+    return FileContent(
+        "LAMMPS data file, atom_style sphere", values[:, 1:4], values[:, 4] / 2, corners, "xlo xhi, ylo yhi, zlo zhi",
+        _unit(path, 1, title[1]) if title else None, numbers[order],
+        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"},
+    )  # fmt: skip
 
 
-def _data_header(path: AnyPath, texts: list[str]) -> tuple[int, Box | None]:
-    """Number of atoms and box."""
+def _data_header(path: AnyPath, texts: list[str]) -> tuple[int, Corners | None]:
+    """Number of atoms and corners of the box."""
     number, bounds = None, {}
     for line, text in enumerate(texts, 2):
         words = text.split()
         if words[1:] == ["atoms"] and _COUNT.fullmatch(words[0]):
             number = int(words[0])
         elif match := re.fullmatch(r"(\S+)\s+(\S+)\s+([xyz])lo\s+\3hi", text):
-            bounds[match[3]] = _bounds(path, line, match[1], match[2])
-        elif words[3:] == ["xy", "xz", "yz"]:
-            raise InputError(f"{path}, line {line}: the box is tilted; only axis-aligned boxes are read.")
+            bounds[match[3]] = _numbers(path, line, match[1], match[2])
+        elif words[3:] == ["xy", "xz", "yz"] and any(_numbers(path, line, *words[:3])):
+            raise _tilted(path, line)
     if number is None:
         raise InputError(f"{path}: the header has no line like '100 atoms'.")
     if set(bounds) != set("xyz"):
         return number, None
-    return number, make_box(path, *zip(*(bounds[axis] for axis in "xyz"), strict=True))
+    lower, upper = zip(*(bounds[axis] for axis in "xyz"), strict=True)
+    return number, (np.array(lower), np.array(upper))
 
 
-def _read_dump(path: AnyPath, lines: list[str]) -> Packing:
+# ---- dumps -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Lines of the items of a frame, counted from 0, and the line after its last."""
+
+    items: dict[str, int]
+    end: int
+    unit: LengthUnit | None
+
+    @property
+    def missing(self) -> str | None:
+        """The first item that the frame lacks."""
+        return next((item for item in _ITEMS if item not in self.items), None)
+
+
+def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileContent:
+    frames = _frames(path, lines)
+    notes: tuple[str, ...] = ()
+    if len(frames) > 1 and _cut_off(lines, frames[-1]):
+        notes = (warn_cut_off(f"{path}, line {len(lines)}", len(frames) - 1),)
+        del frames[-1]
+    chosen = chosen_frame(path, len(frames), options)
+    frame = frames[chosen]
+    if frame.missing:
+        which = "the last frame" if chosen == len(frames) - 1 else f"frame {chosen}"
+        raise InputError(f"{path}: {which} lacks ITEM: {frame.missing}. Was the file cut off?")
+    corners, axes = _dump_box(path, lines, frame.items["BOX BOUNDS"])
+    line = frame.items["BOX BOUNDS"] + 1
+    said = periodicity(f"{path}, line {line}", axes, lines[line - 1].removeprefix("ITEM:").strip(), options)
+    start = frame.items["ATOMS"]
+    rows = Rows(path, lines[start + 1 : frame.end], first=start + 2)
+    _check_number(path, _declared(path, lines, frame), len(rows.texts), rows.numbers[-1] if rows.numbers else start + 1)
+    names = lines[start].split()[2:]
+    columns, scaled = _dump_columns(path, start + 1, names, options)
+    wanted = positions(columns)
+    if "id" in names:
+        wanted["atom id"] = names.index("id")
+    values, numbers = rows.columns(wanted, len(names))
+    if "id" in names:
+        order = _by_id(path, values[:, -1], numbers)
+        values, numbers = values[order, :-1], numbers[order]
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k, axis in scaled.items():
+            values[:, k] = corners[0][axis] + values[:, k] * (corners[1] - corners[0])[axis]
+    centres, radii, unit, shown = spheres(f"{path}, line {start + 1}", columns, values, options)
+    return FileContent(
+        "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", frame.unit or unit, numbers, shown, chosen, len(frames),
+        said, notes,
+    )  # fmt: skip
+
+
+def _frames(path: AnyPath, lines: list[str]) -> list[_Frame]:
+    """Frames, in the order of the file; a TIMESTEP, or the UNITS and the TIME before it, begins one."""
+    frames: list[_Frame] = []
     items: dict[str, int] = {}
-    for position, line in enumerate(lines):
-        if line.startswith("ITEM: TIMESTEP"):
+    unit = None
+    last = len(lines) - 1
+    cut = bool(lines[last]) and ("ITEM:".startswith(lines[last]) or lines[last].startswith("ITEM:"))
+    for position in [k for k, line in enumerate(lines) if line.startswith("ITEM:") or (cut and k == last)]:
+        line = lines[position]
+        name = next((item for item in _ITEMS if item in line), line.removeprefix("ITEM:").strip())
+        if name in items or (
+            "ATOMS" in items and (name in ("UNITS", "TIME", "TIMESTEP") or (cut and position == last))
+        ):
+            frames.append(_Frame(items, position, unit))
             items = {}
-        if line.startswith("ITEM:"):
-            items[next((item for item in _ITEMS if item in line), line)] = position
-    missing = [item for item in _ITEMS if item not in items]
-    if missing:
-        raise InputError(f"{path}: the last frame lacks ITEM: {missing[0]}. Was the file cut off?")
-    box = _dump_box(path, lines, items["BOX BOUNDS"])
-    start = items["ATOMS"]
-    rows = Rows(path, lines[start + 1 :], first=start + 2)
-    declared = items["NUMBER OF ATOMS"] + 1
+        if name == "UNITS":
+            stated = lines[position + 1].strip() if position + 1 < len(lines) else ""
+            unit = _unit(path, position + 2, stated)
+        items[name] = position
+    return [*frames, _Frame(items, len(lines), unit)]
+
+
+def _cut_off(lines: list[str], frame: _Frame) -> bool:
+    """Whether the last frame of a file is not whole."""
+    if frame.missing:
+        return True
+    start, declared = frame.items["ATOMS"], frame.items["NUMBER OF ATOMS"] + 1
     number = lines[declared].strip() if declared < len(lines) else ""
+    rows = [line for line in lines[start + 1 : frame.end] if line.strip()]
+    if not _COUNT.fullmatch(number) or int(number) < len(rows):
+        return False  # wrong in another way, which is an error
+    # LAMMPS ends each line: without an end, the last number may have lost digits.
+    return int(number) > len(rows) or bool(lines[-1])
+
+
+def _declared(path: AnyPath, lines: list[str], frame: _Frame) -> int:
+    position = frame.items["NUMBER OF ATOMS"] + 1
+    number = lines[position].strip() if position < len(lines) else ""
     if not _COUNT.fullmatch(number):
-        raise InputError(f"{path}, line {declared + 1}: {quoted(number)} is not a number of atoms.")
-    _check_number(path, int(number), len(rows.texts), rows.numbers[-1] if rows.numbers else start + 1)
-    columns, scaled, diameters = _dump_columns(path, start + 1, lines[start].split()[2:])
-    values, numbers = rows.columns(columns, len(lines[start].split()) - 2)
-    if scaled:
-        values[:, 1:4] = box.lower + values[:, 1:4] * box.size
-    if diameters:
-        values[:, 4] /= 2
-    return _packing(path, values, numbers, box)
+        raise InputError(f"{path}, line {position + 1}: {quoted(number)} is not a number of atoms.")
+    return int(number)
 
 
-def _dump_box(path: AnyPath, lines: list[str], start: int) -> Box:
-    if "xy" in lines[start] or "abc" in lines[start]:
-        raise InputError(f"{path}, line {start + 1}: the box is tilted; only axis-aligned boxes are read.")
+def _dump_box(path: AnyPath, lines: list[str], start: int) -> tuple[Corners, str]:
+    """Corners of the box, and the axes along which it is periodic."""
+    words = lines[start].removeprefix("ITEM: BOX BOUNDS").split()
+    if "abc" in words:
+        raise _tilted(path, start + 1)
+    tilted = "xy" in words
     bounds = []
     for position in range(start + 1, start + 4):
-        words = lines[position].split() if position < len(lines) else []
-        if len(words) != 2:
-            raise InputError(f"{path}, line {position + 1}: two numbers, lower and upper, are expected.")
-        bounds.append(_bounds(path, position + 1, *words))
-    return make_box(path, *zip(*bounds, strict=True))
+        cells = lines[position].split() if position < len(lines) else []
+        if len(cells) != 2 + tilted:
+            count = "three numbers, lower, upper and tilt" if tilted else "two numbers, lower and upper"
+            raise InputError(f"{path}, line {position + 1}: {count}, are expected.")
+        found = _numbers(path, position + 1, *cells)
+        if tilted and found[2] != 0:
+            raise _tilted(path, position + 1)
+        bounds.append(found[:2])
+    flags = [word for word in words if re.fullmatch("[pfsm]{2}", word)]
+    axes = "".join(axis for axis, flag in zip("xyz", flags, strict=False) if "p" in flag)
+    lower, upper = zip(*bounds, strict=True)
+    return (np.array(lower), np.array(upper)), axes
 
 
-def _dump_columns(path: AnyPath, line: int, names: list[str]) -> tuple[dict[str, int], bool, bool]:
-    """Positions of id, x, y, z and radius; whether coordinates are scaled; whether radii are diameters."""
-    coordinates = next(
-        (
-            [pattern.format(axis) for axis in "xyz"]
-            for pattern in _PLAIN + _SCALED
-            if all(pattern.format(axis) in names for axis in "xyz")
-        ),
-        None,
+def _dump_columns(
+    path: AnyPath, line: int, names: list[str], options: ReadOptions
+) -> tuple[list[Column], dict[int, int]]:
+    """The columns to read, and the axis of each that is scaled by the box."""
+    patterns = next(
+        (pattern for pattern in _PLAIN + _SCALED if all(pattern.format(axis) in names for axis in "xyz")), None
     )
-    size = next((name for name in ("radius", "diameter") if name in names), None)
-    if coordinates is None or size is None or "id" not in names:
+    coordinates = [options.columns.get(axis) or (patterns.format(axis) if patterns else None) for axis in "xyz"]
+    sizes = {known[0] for name in names if (known := recognised(name))} & {"radius", "diameter"}
+    sized = bool(sizes) or options.radius is not None or options.columns.keys() & {"radius", "diameter"}
+    missing = ["x y z (or xu, xs, xsu)"] * (None in coordinates) + ["radius (or diameter)"] * (not sized)
+    if missing:
         raise InputError(
-            f"{path}, line {line}: the columns {quoted(' '.join(names))} lack one of id; x y z (or xu, xs, "
-            "xsu); radius or diameter. In LAMMPS: dump 1 all custom 1000 packing.dump id x y z radius"
+            f"{path}, line {line}: the columns {quoted(' '.join(names))} lack {' and '.join(missing)}. In LAMMPS: "
+            'dump 1 all custom 1000 packing.dump id x y z radius. Or map them: columns = { radius = "..." }, or give '
+            "one radius of all spheres as radius, in m."
         )
-    scaled = coordinates[0] in [pattern.format("x") for pattern in _SCALED]
-    columns = {name: names.index(name) for name in ("id", *coordinates, size)}
-    return columns, scaled, size == "diameter"
+    mapped = dict(zip("xyz", map(str, coordinates), strict=True)) | dict(options.columns)
+    columns = chosen_columns(
+        path, line, names, ReadOptions(mapped, options.radius, options.scale, options.frame, options.periodic)
+    )
+    patterned = {pattern.format(axis): k for pattern in _SCALED for k, axis in enumerate("xyz")}
+    return columns, {k: patterned[column.name] for k, column in enumerate(columns) if column.name in patterned}
 
 
-def _bounds(path: AnyPath, line: int, lower: str, upper: str) -> tuple[float, float]:
+# ---- both --------------------------------------------------------------------------------------------------
+
+
+def _tilted(path: AnyPath, line: int) -> InputError:
+    return InputError(f"{path}, line {line}: the box is tilted; only axis-aligned boxes are read.")
+
+
+def _numbers(path: AnyPath, line: int, *words: str) -> list[float]:
     try:
-        return float(lower), float(upper)
+        return [float(word) for word in words]
     except ValueError:
-        raise InputError(f"{path}, line {line}: {quoted(f'{lower} {upper}')} are not two numbers.") from None
+        count = {2: "two", 3: "three"}[len(words)]
+        raise InputError(f"{path}, line {line}: {quoted(' '.join(words))} are not {count} numbers.") from None
 
 
 def _check_number(path: AnyPath, declared: int, found: int, last_line: int) -> None:
@@ -148,15 +266,16 @@ def _check_number(path: AnyPath, declared: int, found: int, last_line: int) -> N
         raise InputError(f"{path}, line {last_line}: {declared} atoms declared, {found} given. Was the file cut off?")
 
 
-def _packing(path: AnyPath, values: NDArray, lines: NDArray, box: Box | None) -> Packing:
-    """Packing from rows id, x, y, z, radius."""
-    odd = np.flatnonzero(~((values[:, 0] >= 0) & (values[:, 0] < 2**53) & (values[:, 0] % 1 == 0)))
+def _by_id(path: AnyPath, ids: NDArray, lines: NDArray) -> NDArray:
+    """The order of the rows by atom id."""
+    odd = np.flatnonzero(~((ids >= 0) & (ids < 2**53) & (np.trunc(ids) == ids)))
     if len(odd):
-        raise InputError(f"{path}, line {lines[odd[0]]}: atom id {values[odd[0], 0]:g} is not a whole number.")
-    order = np.argsort(values[:, 0], kind="stable")
-    values, lines = values[order], lines[order]
-    twice = np.flatnonzero(values[1:, 0] == values[:-1, 0])
+        raise InputError(f"{path}, line {lines[odd[0]]}: atom id {ids[odd[0]]:g} is not a whole number.")
+    order = np.argsort(ids, kind="stable")
+    twice = np.flatnonzero(ids[order][1:] == ids[order][:-1])
     if len(twice):
-        k = twice[0]
-        raise InputError(f"{path}, line {lines[k + 1]}: atom id {values[k, 0]:.0f} stands on line {lines[k]} already.")
-    return Packing(values[:, 1:4], values[:, 4], box, Source(path, lines))
+        first, second = order[twice[0]], order[twice[0] + 1]
+        raise InputError(
+            f"{path}, line {lines[second]}: atom id {ids[second]:.0f} stands on line {lines[first]} already."
+        )
+    return order

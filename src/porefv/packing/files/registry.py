@@ -1,48 +1,71 @@
-"""Which format a packing file has, and who reads and writes it."""
+"""Who reads and writes each format of packing files."""
 
+from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 
 from porefv.errors import InputError
 from porefv.packing.box import Box
-from porefv.packing.files import csv, lammps, vtk, yade
+from porefv.packing.files import csv, esys, lammps, mercury, pvd, table, vtk, xyz, xyzd, yade
+from porefv.packing.files.detection import EXTENSIONS, detected, extension
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import read_bytes
 from porefv.packing.packing import Packing
 
-_READERS = {"csv": csv.read, "yade": yade.read, "lammps": lammps.read, "vtk": vtk.read}
+_READERS = {
+    "csv": table.read,
+    "yade": table.read,
+    "lammps": lammps.read,
+    "vtk": vtk.read,
+    "pvd": pvd.read,
+    "mercury": mercury.read,
+    "esys": esys.read,
+    "xyz": xyz.read,
+    "xyzd": xyzd.read,
+}
 _WRITERS = {"csv": csv.write, "yade": yade.write, "vtk": vtk.write}
 
-# Format of each file extension.
-EXTENSIONS = {
-    ".csv": "csv",
-    ".txt": "yade",
-    ".spheres": "yade",
-    ".yade": "yade",
-    ".lammps": "lammps",
-    ".lmp": "lammps",
-    ".data": "lammps",
-    ".dump": "lammps",
-    ".lammpstrj": "lammps",
-    ".vtk": "vtk",
-    ".vtp": "vtk",
-    ".vtu": "vtk",
-}
+FORMATS = tuple(_READERS)
 
 
-def read_packing(path: str | PathLike[str], format: str | None = None, box: Box | None = None) -> Packing:
-    """Read a packing file.
+def read_packing(
+    path: str | PathLike[str],
+    format: str | None = None,
+    box: Box | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    radius: float | None = None,
+    scale: float | None = None,
+    frame: int | None = None,
+    periodic: str | None = None,
+) -> Packing:
+    """Read a packing file, of text also compressed by gzip.
 
     Parameters
     ----------
     path : path
-    format : {"csv", "yade", "lammps", "vtk"}, optional
-        Default: by the extension of the file (`EXTENSIONS`).
+    format : {"csv", "yade", "lammps", "vtk", "pvd", "mercury", "esys", "xyz", "xyzd"}, optional
+        Default: by the content of the file, and then by its extension (`EXTENSIONS`).
     box : Box, optional
-        Box to use instead of the one in the file.
+        Box to use instead of the one in the file, m.
+    columns : mapping of str to str, optional
+        Name of the column of x, y, z, radius or diameter; without a header, its place counted from 1, such as "4".
+        Default: by the usual names.
+    radius : float, optional
+        Radius of all spheres of a file without radii, m.
+    scale : float, optional
+        Factor by which lengths in the file, its box included, are multiplied to be in m. Default: by the unit that
+        the file states, or 1.
+    frame : int, optional
+        Frame to read, counted from 0; -1 is the last. Default: the last.
+    periodic : {"ignore"}, optional
+        Read a periodic packing into a box with six walls; flow near these walls is not that of the bulk. Default:
+        refuse it.
 
     Returns
     -------
     Packing
-        Its values are finite and its radii positive; `Packing.validate` checks the rest.
+        Its values are finite and its radii positive; `Packing.validate` checks the rest. `Packing.reading` says what
+        was understood of the file.
 
     Raises
     ------
@@ -51,8 +74,11 @@ def read_packing(path: str | PathLike[str], format: str | None = None, box: Box 
     MissingExtraError
         If the format needs a package that is not installed.
     """
-    packing = _READERS[_format(path, format, _READERS, "read")](path)
-    return packing if box is None else packing.with_box(box)
+    options = ReadOptions(columns or {}, radius, scale, frame, periodic).check(path)
+    if format is not None and format not in _READERS:
+        raise InputError(f"{path}: format '{format}' cannot be read. Give one of {', '.join(_READERS)}.")
+    content = read_bytes(path)
+    return _READERS[format or detected(path, content)](path, content, options).packing(path, options, box)
 
 
 def write_packing(packing: Packing, path: str | PathLike[str], format: str | None = None) -> None:
@@ -70,19 +96,13 @@ def write_packing(packing: Packing, path: str | PathLike[str], format: str | Non
     InputError
         If the file cannot be written.
     """
-    _WRITERS[_format(path, format, _WRITERS, "written")](packing, path)
-
-
-def _format(path: str | PathLike[str], format: str | None, known: dict, done: str) -> str:
-    if format is None:
-        suffix = Path(path).suffix.lower()
-        if EXTENSIONS.get(suffix) not in known:
-            extensions = " ".join(suffix for suffix, name in EXTENSIONS.items() if name in known)
-            raise InputError(
-                f"{path}: the extension '{suffix}' tells no format that can be {done}. "
-                f"Use one of {extensions}, or give format as one of {', '.join(known)}."
-            )
-        return EXTENSIONS[suffix]
-    if format not in known:
-        raise InputError(f"{path}: format '{format}' cannot be {done}. Give one of {', '.join(known)}.")
-    return format
+    if format is not None and format not in _WRITERS:
+        raise InputError(f"{path}: format '{format}' cannot be written. Give one of {', '.join(_WRITERS)}.")
+    found = format or EXTENSIONS.get(extension(path))
+    if found not in _WRITERS or str(path).lower().endswith(".gz"):
+        extensions = " ".join(suffix for suffix, name in EXTENSIONS.items() if name in _WRITERS)
+        raise InputError(
+            f"{path}: the extension tells no format that can be written. Use one of {extensions}, or give format as "
+            f"one of {', '.join(_WRITERS)}."
+        )
+    _WRITERS[found](packing, path)

@@ -2,6 +2,7 @@
 
 import csv
 import re
+import zlib
 from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -15,19 +16,20 @@ from porefv.packing.packing import Packing
 from porefv.system.atomic_files import atomic_write
 
 AnyPath = str | PathLike[str]
+Corners = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 _MOST_QUOTED = 40  # characters of a file shown in an error
+_MOST_PER_BYTE = 200  # bytes of a decompressed file for each byte of the compressed one: text of numbers has 2 to 30
 
 
-def read_lines(path: AnyPath) -> list[str]:
-    """The lines of a UTF-8 text file, without their ends (of any system) and without a byte-order mark.
+def text_lines(path: AnyPath, content: bytes) -> list[str]:
+    """The lines of UTF-8 text, without their ends (of any system) and without a byte-order mark.
 
     Raises
     ------
     InputError
-        If there is no such file, it cannot be read, is empty, or is not text.
+        If the content of the file is not text.
     """
-    content = read_bytes(path)
     if b"\0" in content:
         raise InputError(f"{path}: not text (it holds zero bytes). Is it binary, compressed, or UTF-16?")
     try:
@@ -39,7 +41,7 @@ def read_lines(path: AnyPath) -> list[str]:
 
 
 def read_bytes(path: AnyPath) -> bytes:
-    """The content of a file; InputError if there is none."""
+    """The content of a file, decompressed if it is a gzip file; InputError if there is none."""
     file = Path(path)
     try:
         if file.is_dir():
@@ -53,9 +55,32 @@ def read_bytes(path: AnyPath) -> bytes:
         raise InputError(f"{path}: there is no such file (looked for {file.absolute()}).") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+    if content.startswith(b"\x1f\x8b"):
+        content = _decompressed(path, content)
     if not content.strip():
         raise InputError(f"{path}: the file is empty.")
     return content
+
+
+def _decompressed(path: AnyPath, content: bytes) -> bytes:
+    """The content of a gzip file of one or several members."""
+    most = _MOST_PER_BYTE * len(content)
+    parts: list[bytes] = []
+    try:
+        while content.strip(b"\0"):
+            stream = zlib.decompressobj(wbits=31)
+            parts.append(stream.decompress(content, most + 1))
+            most -= len(parts[-1])
+            if most < 0:
+                raise InputError(
+                    f"{path}: the file is compressed to less than 1/{_MOST_PER_BYTE} of its size. Decompress it first."
+                )
+            if not stream.eof:
+                raise InputError(f"{path}: the gzip file is cut off. Make or fetch it again.")
+            content = stream.unused_data
+    except zlib.error as error:
+        raise InputError(f"{path}: the gzip file is damaged ({error}). Make or fetch it again.") from None
+    return b"".join(parts)
 
 
 class Rows:
@@ -161,13 +186,13 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= _MOST_QUOTED else text[: _MOST_QUOTED - 3] + "...")
 
 
-def read_metadata(path: AnyPath, comments: Iterable[tuple[int, str]]) -> tuple[Box | None, dict[str, str]]:
-    """The box and the other values given by comments ``# key = value``; other comments are ignored.
+def read_metadata(path: AnyPath, comments: Iterable[tuple[int, str]]) -> tuple[Corners | None, dict[str, str]]:
+    """The corners of the box and the other values given by comments ``# key = value``; other comments are ignored.
 
     Raises
     ------
     InputError
-        If ``box_lower`` or ``box_upper`` stands alone, twice, or does not make a box.
+        If ``box_lower`` or ``box_upper`` stands alone, twice, or is not three numbers.
     """
     metadata: dict[str, str] = {}
     corners: dict[str, list[float]] = {}
@@ -192,7 +217,7 @@ def read_metadata(path: AnyPath, comments: Iterable[tuple[int, str]]) -> tuple[B
     if len(corners) == 1:
         missing = ({"box_lower", "box_upper"} - set(corners)).pop()
         raise InputError(f"{path}: a line '# {missing} = x y z' is missing.")
-    return make_box(path, corners["box_lower"], corners["box_upper"]), metadata
+    return (np.array(corners["box_lower"]), np.array(corners["box_upper"])), metadata
 
 
 def make_box(path: AnyPath, lower: ArrayLike, upper: ArrayLike) -> Box:

@@ -1,13 +1,14 @@
 """VTK point sets (.vtk, .vtp, .vtu): points with a radius each. XML files are read by VTK, in a process of its own.
 
-The radius is point data named radius, radii or r, or diameter, in any case. Field data ``box_lower`` and
-``box_upper`` give the box. Cells are not read.
+The radius is point data named radius, radii, r, diameter and the like. Field data ``box_lower`` and ``box_upper``
+give the box. Cells are not read.
 """
 
 import io
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,16 @@ from typing import Any
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.box import Box
-from porefv.packing.files.text import AnyPath, make_box, quoted, read_bytes
+from porefv.packing.files.column_names import Column, chosen_columns, roles, spheres
+from porefv.packing.files.content import FileContent, missing_radius
+from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import AnyPath, Corners, quoted
 from porefv.packing.files.vtk_legacy import LegacyMesh
-from porefv.packing.packing import Packing, Source
+from porefv.packing.packing import Packing
 from porefv.system.atomic_files import atomic_write
 from porefv.system.optional_imports import ensure_installed, load
 
-_HALVES = {"radius": 1.0, "radii": 1.0, "r": 1.0, "diameter": 0.5, "diameters": 0.5}
 _CORNERS = ("box_lower", "box_upper")
 
 # The program that reads XML files, in a process of its own.
@@ -38,19 +41,28 @@ class _XmlMesh:
     field_data: dict[str, np.ndarray]
 
 
-def read(path: AnyPath) -> Packing:
+def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     """Read a VTK file; errors name the file and the sphere."""
-    mesh = _read_mesh(path)
-    names = [name for name in mesh.point_data if name.lower() in _HALVES]
-    if len(names) != 1:
-        raise InputError(
-            f"{path}: one array of point data named radius (or radii, r, diameter) is needed, and there are "
-            f"{len(names)}. Point data: {', '.join(map(quoted, mesh.point_data)) or 'none'}."
-        )
-    radii = np.asarray(mesh.point_data[names[0]])
-    if radii.ndim != 1:
-        raise InputError(f"{path}: point data {quoted(names[0])} must have one component a point.")
-    return Packing(mesh.points, radii * _HALVES[names[0].lower()], _box(path, mesh), Source(path))
+    chosen_frame(path, 1, options)
+    if options.columns.keys() & set("xyz"):
+        raise InputError(f"{path}: the points of a VTK file are the centres. Map radius or diameter only.")
+    mesh = _read_mesh(path, content)
+    arrays = list(mesh.point_data)
+    if options.radius is None and not roles(arrays, options) & {"radius", "diameter"}:
+        missing_radius(path, f"point data: {', '.join(map(quoted, arrays)) or 'none'}, and ")
+    columns, values = [Column(axis, k, axis) for k, axis in enumerate("xyz")], [mesh.points]
+    for column in chosen_columns(path, 0, arrays, options, wanted=("radius", "diameter")):
+        found = np.asarray(mesh.point_data[arrays[column.position]])
+        if found.ndim != 1:
+            raise InputError(f"{path}: point data {quoted(column.name)} must have one component a point.")
+        columns.append(column)
+        values.append(found[:, None])
+    points = np.concatenate(values, axis=1)
+    centres, radii, unit, names = spheres(f"{path}", columns, points.astype(np.float64), options)
+    corners = _corners(path, mesh)
+    kind = "legacy VTK" if isinstance(mesh, LegacyMesh) else "VTK XML"
+    names = {"centres": "points"} | ({"radius": names["radius"]} if "radius" in names else {})
+    return FileContent(kind, centres, radii, corners, "field data box_lower, box_upper", unit, columns=names)
 
 
 def write(packing: Packing, path: AnyPath) -> None:
@@ -90,15 +102,24 @@ def _serialised(points: Any, suffix: str) -> bytes:
     return content if isinstance(content, bytes) else content.encode()  # text, where its bytes happen to be UTF-8
 
 
-def _read_mesh(path: AnyPath) -> LegacyMesh | _XmlMesh:
-    content = read_bytes(path)
+def _read_mesh(path: AnyPath, content: bytes) -> LegacyMesh | _XmlMesh:
     if content.startswith(b"# vtk DataFile"):
         return LegacyMesh(path, content)
     if not content[:100].lstrip().startswith((b"<?xml", b"<VTKFile")):
         raise InputError(f"{path}: not a VTK file (legacy .vtk, or XML .vtp or .vtu).")
     ensure_installed("vtkmodules", "pyvista", "Reading VTK files")
+    if Path(path).suffix.lower() != ".gz":
+        return _read_xml(path, path)
+    with tempfile.TemporaryDirectory() as folder:
+        decompressed = Path(folder, "decompressed.vtp")
+        decompressed.write_bytes(content)
+        return _read_xml(path, decompressed)
+
+
+def _read_xml(path: AnyPath, file: AnyPath) -> _XmlMesh:
+    """The content of an XML file; errors name `path`."""
     # -P: modules beside the program do not hide those of Python.
-    command = [sys.executable, "-P", os.fspath(_READER), os.fspath(path)]
+    command = [sys.executable, "-P", os.fspath(_READER), os.fspath(file)]
     done = subprocess.run(command, capture_output=True, check=False)
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").strip().splitlines()
@@ -113,10 +134,11 @@ def _read_mesh(path: AnyPath) -> LegacyMesh | _XmlMesh:
         return _XmlMesh(arrays["points"], kinds["point"], kinds["field"])
 
 
-def _box(path: AnyPath, mesh: LegacyMesh | _XmlMesh) -> Box | None:
+def _corners(path: AnyPath, mesh: LegacyMesh | _XmlMesh) -> Corners | None:
     if not any(name in mesh.field_data for name in _CORNERS):
         return None
     missing = [name for name in _CORNERS if name not in mesh.field_data]
     if missing:
         raise InputError(f"{path}: field data {missing[0]} is missing.")
-    return make_box(path, *(np.ravel(mesh.field_data[name]) for name in _CORNERS))
+    lower, upper = (np.ravel(mesh.field_data[name]).astype(np.float64) for name in _CORNERS)
+    return lower, upper

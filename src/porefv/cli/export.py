@@ -1,0 +1,35 @@
+"""The command `porefv export`: write results for other programs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from porefv.cli.text import path_text, say
+
+# As `porefv.results.exporting.FORMATS`, which would be slow to import for the help.
+FORMATS = ("openpnm", "csv", "inp", "mesh", "msh", "nas", "vtk", "vtu")
+
+
+def register(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("export", help="write pores and throats of results for other programs")
+    parser.add_argument("results", metavar="RESULTS", type=Path, help="results of porefv solve, with vtk = true")
+    parser.add_argument(
+        "--to", choices=FORMATS, required=True,
+        help="openpnm: arrays in the names of OpenPNM, a .npz file; csv: pores.csv and throats.csv in a directory; "
+        "others: the mesh of the pores, written by meshio",
+    )  # fmt: skip
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="file, or directory of csv, to write")
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
+    parser.set_defaults(command=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command."""
+    from porefv.results.exporting import export
+    from porefv.results.reading import read
+
+    for path in export(read(options.results), options.out, options.to, force=options.force):
+        say(f"written {path_text(path)}")

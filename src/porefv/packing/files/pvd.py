@@ -1,0 +1,36 @@
+"""ParaView's list of frames (.pvd), such as the ``grains.pvd`` of `porefv.export.Trajectory`: one frame is read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+from porefv.errors import InputError
+from porefv.packing.files import vtk
+from porefv.packing.files.content import FileContent
+from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import AnyPath, quoted, read_bytes
+
+
+def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
+    """Read the VTK file of a frame; errors name the list and that file."""
+    try:
+        entries = [entry.attrib for entry in ElementTree.fromstring(content).iter("DataSet")]
+        times = sorted((float(entry.get("timestep", "0")), entry["file"]) for entry in entries)
+    except (ElementTree.ParseError, KeyError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: not a list of frames of ParaView, or damaged ({error}).") from None
+    if not times:
+        raise InputError(f"{path}: the list has no frames.")
+    if len({time for time, _ in times}) < len(times):
+        raise InputError(f"{path}: the list has several files of the same time. Read one of these files instead.")
+    chosen = chosen_frame(path, len(times), options)
+    file = Path(path).parent / times[chosen][1]
+    if file.suffix.lower() not in (".vtp", ".vtu", ".vtk"):
+        raise InputError(f"{path}: its frame {quoted(times[chosen][1])} is no .vtp, .vtu or .vtk file.")
+    try:
+        found = vtk.read(file, read_bytes(file), replace(options, frame=None))
+    except InputError as error:
+        raise InputError(f"{path}: its frame {chosen} cannot be read: {error}") from None
+    return replace(found, format=f"{found.format} in a .pvd list", frame=chosen, frames=len(times))

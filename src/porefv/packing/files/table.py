@@ -1,0 +1,267 @@
+"""Tables of spheres in text: one sphere a line, with or without a header.
+
+Cells are separated by commas, semicolons, tabs or blanks. The columns are found
+
+* by the names in a header, which may stand after other lines, or in a comment (numpy.savetxt);
+* by a comment ``#format x_y_z_r_matId``, as Yade's export.textExt writes it;
+* by their places, without a header: ``x y z r`` (Yade's export.text); ``x y z r clump`` (SpherePack.save);
+  ``id x y z r`` (Voro++). A line with the number of spheres may stand before them.
+
+Lines that start with # are comments; ``# box_lower = 0 0 0`` and ``# box_upper = 1 1 1`` give the box, and
+``##PERIODIC:: 1 1 1`` that of a periodic cell.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from porefv.errors import InputError
+from porefv.packing.files.column_names import UNITS, Column, chosen_columns, positions, roles, spheres
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity, warn_radius
+from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metadata, split, text_lines
+
+_DELIMITERS = (";", "\t", ",", None)
+_MOST_BEFORE = 100  # rows among which the header is looked for
+
+_PERIODIC = "#PERIODIC::"  # after the # of a comment
+_SPHERE_PACK = "SpherePack text (x y z radius clump)"
+
+_HEADERLESS = (
+    'Give a header line such as x,y,z,radius, or the places of the columns, as in columns = { x = "1", y = "2", '
+    'z = "3", radius = "4" }.'
+)
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The names of the columns, and where the rows start."""
+
+    names: list[str]
+    line: int  # 0: there is none
+    skip: int
+    delimiter: str | None
+    format: str
+
+
+def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
+    """Read a table; errors name the file and the line."""
+    rows = Rows(path, text_lines(path, content))
+    if not rows.texts:
+        raise InputError(f"{path}: only comments. Give a header x,y,z,radius, then one sphere a line.")
+    chosen_frame(path, 1, options)
+    header = _header(path, rows, options)
+    cells = len(header.names)
+    if header.line:
+        columns = chosen_columns(path, header.line, header.names, options)
+        values, lines = _values(rows, columns, cells, header)
+    else:
+        header, columns, values, lines = _without_names(path, rows, header, options)
+    place = f"{path}, line {header.line}" if header.line else f"{path}"
+    centres, radii, unit, names = spheres(place, columns, values, options)
+    stated = _unit_in_comments(path, rows)
+    if unit and stated and unit.metres != stated.metres and options.scale is None:
+        raise InputError(
+            f"{stated.place}: the unit is {quoted(stated.name)}, and the names of columns state {quoted(unit.name)}. "
+            "Give the length of the unit in m as scale."
+        )
+    corners, metadata = read_metadata(path, rows.comments)
+    box_place = "comments box_lower, box_upper"
+    cell, said = _periodic_cell(path, rows, options)
+    if cell is not None:
+        corners, box_place = cell, "##PERIODIC::"
+    return FileContent(
+        header.format,
+        centres,
+        radii,
+        corners,
+        box_place,
+        unit or stated,
+        lines,
+        names,
+        periodicity=said,
+        metadata=metadata,
+    )
+
+
+def _values(rows: Rows, columns: list[Column], cells: int, header: _Header) -> tuple[NDArray, NDArray]:
+    """(n, number of columns) numbers, and the lines."""
+    return rows.columns(positions(columns), cells, header.delimiter, header.skip)
+
+
+def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
+    for line, comment in rows.comments:
+        words = comment.split()
+        if len(words) == 2 and words[0] == "format":
+            return _yade_format(path, line, words[1], rows)
+    first = next((k for k, text in enumerate(rows.texts[:_MOST_BEFORE]) if _is_numbers(text)), None)
+    delimiter = _delimiter(rows.texts[first]) if first is not None else None
+    cells = len(split(rows.texts[first], delimiter)) if first is not None else 0
+    before = rows.texts[: _MOST_BEFORE if first is None else first]
+    found = [
+        _Header(names, rows.numbers[k], k + 1, mark, _with_header(mark))
+        for k, text in enumerate(before)
+        for mark, names in _cells_of_header(text)
+    ]
+    # A header in a comment may be separated in another way than the rows. Other comments have other numbers of words.
+    found += [
+        _Header(names, line, first or 0, delimiter, _with_header(delimiter))
+        for line, text in rows.comments[:_MOST_BEFORE]
+        for _, names in _cells_of_header(text)
+        if len(names) == cells
+    ]
+    known = [len(roles(header.names, options) & {"x", "y", "z"}) for header in found]
+    known = [
+        0 if number == 1 and len(header.names) < 3 else number for number, header in zip(known, found, strict=True)
+    ]
+    if any(known):
+        # Of several ways to split a header, the one that splits the rows into as many cells comes first.
+        fits = [header.delimiter == delimiter and len(header.names) == cells for header in found]
+        scores = [number + 3 * (fit and number > 0) for number, fit in zip(known, fits, strict=True)]
+        return found[scores.index(max(scores))]
+    if first == 0 or (first == 1 and _is_count(path, rows)):
+        return _Header([str(k + 1) for k in range(cells)], 0, first, delimiter, "table without header")
+    last = len(before) - 1 if first else 0
+    mark, names = next((mark, names) for mark, names in _cells_of_header(before[last]))
+    return _Header(names, rows.numbers[last], last + 1, mark, _with_header(mark))
+
+
+def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
+    """The names in a line, for each delimiter that the line has; units in brackets belong to the name before them."""
+    text = re.sub(r"^\s*(?:[%!]|//|;\s)\s*", "", text)  # marks of comments in other programs
+    for mark in _DELIMITERS:
+        if mark is None:
+            yield mark, re.findall(r"\S+(?:\s+[\[(][^\s\])]*[\])])?", text)
+        elif mark in text:
+            yield mark, [name.strip() for name in split(text, mark)]
+
+
+def _is_count(path: AnyPath, rows: Rows) -> bool:
+    """Whether the first row is the number of the others; InputError if it is another number."""
+    text, given = rows.texts[0].strip(), len(rows.texts) - 1
+    if not re.fullmatch("[0-9]{1,15}", text):
+        return False
+    if int(text) != given:
+        raise InputError(
+            f"{path}, line {rows.numbers[0]}: {text} spheres declared, {given} given. Was the file cut off?"
+        )
+    return True
+
+
+def _with_header(delimiter: str | None) -> str:
+    kind = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}[delimiter]
+    return f"table with header, separated by {kind}"
+
+
+def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
+    names = text.split("_")
+    if not {"x", "y", "z", "r"} <= set(names):
+        raise InputError(f"{path}, line {line}: the format {quoted(text)} lacks one of x, y, z, r.")
+    if names[-1] == "attrs":
+        names += [""] * (len(rows.texts[0].split()) - len(names))
+    return _Header(names, line, 0, None, "Yade text (#format)")
+
+
+def _unit_in_comments(path: AnyPath, rows: Rows) -> LengthUnit | None:
+    """The unit of lengths that a comment like ``# units = mm`` states."""
+    for line, comment in rows.comments:
+        if match := re.fullmatch(r"(?:length[ _]?)?units?\s*[:=]\s*(\S{1,40})", comment, re.IGNORECASE):
+            return LengthUnit(match[1], UNITS.get(match[1].lower()), f"{path}, line {line}")
+    return None
+
+
+def _is_numbers(text: str) -> bool:
+    """Whether a line is a row of spheres: three numbers or more."""
+    cells = split(text, _delimiter(text))
+    return sum(map(_is_number, cells)) >= 3
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _delimiter(row: str) -> str | None:
+    """What separates the cells of a row of numbers."""
+    return max(_DELIMITERS, key=lambda mark: (sum(map(_is_number, split(row, mark))), mark is None))
+
+
+def _without_names(
+    path: AnyPath, rows: Rows, header: _Header, options: ReadOptions
+) -> tuple[_Header, list[Column], NDArray, NDArray]:
+    """Columns by their places, the format that these tell, and all values."""
+    cells, line = len(header.names), rows.numbers[header.skip]
+    if options.columns:
+        columns = chosen_columns(path, line, header.names, options)
+        return header, columns, *_values(rows, columns, cells, header)
+    sized = options.radius is None
+    if cells not in (3 + sized, 5):
+        raise InputError(
+            f"{path}, line {line}: {cells} columns without names{'' if cells != 3 else ' and no radius'}. {_HEADERLESS}"
+        )
+    places = dict(zip(("x", "y", "z", "radius"), range(4), strict=True))
+    everything = {name: k for k, name in enumerate(("x", "y", "z", "radius", "column 5")[:cells])}
+    values, lines = rows.columns(everything, cells, header.delimiter, header.skip)
+    numbered = _is_numbering(values[:, 0])
+    format = "table without header, x y z radius"
+    if cells == 4 and numbered and len(values) > 3 and values[:, 3].min() != values[:, 3].max():
+        raise InputError(
+            f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read "
+            f"as x. {_HEADERLESS}"
+        )
+    if cells == 5 and any(comment.startswith(_PERIODIC) for _, comment in rows.comments):
+        format = _SPHERE_PACK
+    elif cells == 5:
+        whole = bool((np.trunc(values[:, 4]) == values[:, 4]).all())
+        if numbered == whole:
+            raise InputError(
+                f"{path}, line {line}: 5 columns without names are neither clearly id x y z radius (Voro++) nor "
+                f"x y z radius clump (SpherePack). {_HEADERLESS}"
+            )
+        format = "Voro++ text (id x y z radius)" if numbered else _SPHERE_PACK
+        places = {role: place + numbered for role, place in places.items()}
+    if not sized:
+        if cells == 5:
+            warn_radius(path, f"place {places['radius'] + 1}")
+        del places["radius"]
+        format = "table without header, x y z" if cells == 3 else format
+    columns = [Column(role, place, str(place + 1)) for role, place in places.items()]
+    return (
+        _Header(header.names, 0, header.skip, header.delimiter, format),
+        columns,
+        values[:, list(places.values())],
+        lines,
+    )
+
+
+def _is_numbering(values: NDArray) -> bool:
+    """Whether values are n consecutive whole numbers, from 0 or 1, in any order."""
+    if not (np.isfinite(values).all() and values.min() in (0.0, 1.0)):
+        return False
+    return bool((np.sort(values) == np.arange(len(values)) + values.min()).all())
+
+
+def _periodic_cell(path: AnyPath, rows: Rows, options: ReadOptions) -> tuple[Corners | None, str]:
+    """Corners of the periodic cell of a SpherePack file, from the origin; and what is said of it."""
+    for line, comment in rows.comments:
+        if not comment.startswith(_PERIODIC):
+            continue
+        try:
+            size = np.array([float(word) for word in comment.removeprefix(_PERIODIC).split()])
+        except ValueError:
+            size = np.empty(0)
+        if size.shape != (3,):
+            raise InputError(
+                f"{path}, line {line}: ##PERIODIC:: must be followed by three numbers, not {quoted(comment)}."
+            )
+        return (np.zeros(3), size), periodicity(f"{path}, line {line}", "xyz", "##PERIODIC::", options)
+    return None, ""
