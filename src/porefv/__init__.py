@@ -41,12 +41,15 @@ if TYPE_CHECKING:
     from porefv.conductance.model import ConductanceModel
     from porefv.conductance.section_friction.model import SectionFriction
     from porefv.errors import ComputationError, InputError, PorefvError
+    from porefv.flow.directional_permeabilities import directional_permeabilities
     from porefv.flow.fluid import Fluid
     from porefv.flow.flux import fluxes
     from porefv.flow.forces import Forces, grain_forces
+    from porefv.flow.inside import FixedPressure, FlowSource
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
     from porefv.flow.pressure_on_grains import acting_pressure
+    from porefv.flow.regions import Point, Sphere
     from porefv.flow.walls import Wall, Walls
     from porefv.mesh.cell_mesh import CellMesh
     from porefv.mesh.facets import Facets
@@ -63,22 +66,27 @@ _HOMES = {
     "ConductanceModel": "porefv.conductance.model",
     "EffectiveRadius": "porefv.conductance.effective_radius",
     "Facets": "porefv.mesh.facets",
+    "FixedPressure": "porefv.flow.inside",
+    "FlowSource": "porefv.flow.inside",
     "Fluid": "porefv.flow.fluid",
     "Forces": "porefv.flow.forces",
     "HydraulicRadius": "porefv.conductance.hydraulic_radius",
     "InputError": "porefv.errors",
     "Packing": "porefv.packing.packing",
+    "Point": "porefv.flow.regions",
     "PoreFlow": "porefv.flow.pore_flow",
     "PoreMesh": "porefv.mesh.pore_mesh",
     "PorefvError": "porefv.errors",
     "PressureField": "porefv.flow.pressure",
     "RegularTriangulation": "porefv.tessellation.triangulation",
     "SectionFriction": "porefv.conductance.section_friction.model",
+    "Sphere": "porefv.flow.regions",
     "Throats": "porefv.mesh.throats",
     "WALLS": "porefv.packing.box",
     "Wall": "porefv.flow.walls",
     "Walls": "porefv.flow.walls",
     "acting_pressure": "porefv.flow.pressure_on_grains",
+    "directional_permeabilities": "porefv.flow.directional_permeabilities",
     "fluxes": "porefv.flow.flux",
     "grain_forces": "porefv.flow.forces",
     "solve_pressure": "porefv.flow.pressure",
@@ -92,21 +100,26 @@ __all__ = [
     "ConductanceModel",
     "EffectiveRadius",
     "Facets",
+    "FixedPressure",
+    "FlowSource",
     "Fluid",
     "Forces",
     "HydraulicRadius",
     "InputError",
     "Packing",
+    "Point",
     "PoreFlow",
     "PoreMesh",
     "PorefvError",
     "PressureField",
     "RegularTriangulation",
     "SectionFriction",
+    "Sphere",
     "Throats",
     "Wall",
     "Walls",
     "acting_pressure",
+    "directional_permeabilities",
     "fluxes",
     "grain_forces",
     "solve_pressure",

@@ -216,6 +216,12 @@ def test_an_incompressible_fluid_needs_a_way_out(sample):
         Coupling(dem, SEALED).run(1)
 
 
+def test_walls_of_imposed_flow_are_refused(sample):
+    walls = Walls(z_max=Wall(inflow=1e-3), z_min=Wall(pressure=0.0))
+    with pytest.raises(InputError, match="z_max has an imposed flow"):
+        Coupling(sample(3e3), walls)
+
+
 # ---- schemes ---------------------------------------------------------------------------------------------------
 
 

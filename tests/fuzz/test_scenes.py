@@ -40,6 +40,30 @@ directory = "results"
 quantities = ["permeability", "pressure", "forces"]
 vtk = false
 """
+# Imposed flows, regions and units.
+DRIVEN = """\
+packing = "grains.csv"
+[box]
+lower = ["0 mm", 0.0, 0.0]
+upper = [1.0, "1 m", 1.0]
+[fluid]
+viscosity = "1 cP"
+[walls]
+y_min = { inflow = 1.0e-3 }
+y_max = { pressure = 0.0 }
+x_max = { velocity = "-1 mm/s" }
+[[sources]]
+point = [0.5, 0.5, 0.5]
+flow = 1.0e-3
+[[sources]]
+box = { lower = [-1.0, -1.0, -1.0], upper = [2.0, 2.0, 2.0] }
+flow = "-1 L/s"
+[[pressures]]
+sphere = { centre = [0.1, 0.3, 1.0], radius = "200 mm" }
+pressure = "1 kPa"
+[output]
+quantities = ["permeabilities", "pressure", "forces"]
+"""
 # The paper's model, and its parameter.
 PAPER = SOUND.replace('conductance = "auto"', 'conductance = "hydraulic-radius"\nalpha = 0.5')
 
@@ -48,12 +72,16 @@ WORDS = [
     '"é"',
     '"\\u0000"', '"' + "a" * 300 + '"', '"../.."', '"/"', '"."', '"auto"', '"cg"', '"effective-radius"',
     "[0.0, 0.0, 0.0]", "[1e9, 1e9, 1e9]",
+    '"1 cP"', '"-2 mm/s"', '["1 mm", 0.5, "5e-4 km"]', '{ inflow = 1e-3 }', '{ velocity = "1 mm/s" }',
+    '["permeabilities"]',
+    '{ lower = [0, 0, 0], upper = [1, 1, 1] }', '{ centre = [0.5, 0.5, 0.5], radius = 0.4 }',
     '["permeability"]', '{ pressure = 2.0 }', '{ pressure = 1e300 }', '{ slip = 3 }', "1979-05-27", "[[1]]", "[" * 2000,
     "{ a = " * 400, "\x00", "\t", "=", "#", "'''",
 ]  # fmt: skip
 KEYS = [
     "packing", "viscosity", "density", "pressure", "slip", "lateral", "unite_tolerance", "wall_tolerance", "alpha",
     "solver",
+    "inflow", "velocity", "point", "box", "sphere", "flow", "sources", "pressures",
     "tolerance", "gravity", "quantities", "vtk", "lower", "upper", "conductance", *WALLS,
 ]  # fmt: skip
 
@@ -68,7 +96,7 @@ def folder(tmp_path_factory):
 @st.composite
 def texts(draw):
     """A sound scene with values replaced, lines left out, doubled or moved, tables added, characters lost."""
-    lines = draw(st.sampled_from([SOUND, SOUND, PAPER])).splitlines()
+    lines = draw(st.sampled_from([SOUND, SOUND, PAPER, DRIVEN])).splitlines()
     for _ in range(draw(st.integers(1, 4))):
         k = draw(st.integers(0, len(lines) - 1))
         match draw(st.sampled_from(["value", "value", "value", "drop", "double", "move", "key", "table", "cut"])):
@@ -86,7 +114,22 @@ def texts(draw):
                 lines.insert(k, draw(st.sampled_from(KEYS)) + " = " + draw(st.sampled_from(WORDS)))
             case "table":
                 lines.insert(
-                    k, draw(st.sampled_from(["[walls.x_min]", "[[walls]]", "[packing]", "[a.b]", "[", "[]", "[mesh]"]))
+                    k,
+                    draw(
+                        st.sampled_from(
+                            [
+                                "[walls.x_min]",
+                                "[[walls]]",
+                                "[packing]",
+                                "[a.b]",
+                                "[",
+                                "[]",
+                                "[mesh]",
+                                "[[sources]]",
+                                "[[pressures]]",
+                            ]
+                        )
+                    ),
                 )
             case "cut":
                 lines[k] = lines[k][: draw(st.integers(0, len(lines[k])))]
@@ -97,6 +140,7 @@ def texts(draw):
 @given(text=texts())
 @example(text=SOUND)
 @example(text=PAPER)
+@example(text=DRIVEN)
 @example(text="a = " + "[" * 5000)
 @example(text=PAPER.replace("alpha = 0.5", "alpha = 1e308"))
 @example(text=PAPER.replace("alpha = 0.5", "alpha = 1e-320"))

@@ -69,6 +69,9 @@ BASES = {
         "box": {"lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]},
         "walls": {"y_min": {"pressure": 1.0}, "y_max": {"pressure": 0.0}},
         "flow": {"conductance": "hydraulic-radius"},
+        "sources": [{"sphere": {"centre": [0.5, 0.5, 0.5], "radius": 0.1}, "flow": 1.0}],
+        "pressures": [{"sphere": {"centre": [0.5, 0.5, 0.5], "radius": 0.1}, "pressure": 1.0}],
+        "output": {"quantities": ["pressure"]},
     },
     "packing": {
         "output": "out.csv",
@@ -93,7 +96,7 @@ def numbers(kind):
         for name, key in table["properties"].items():
             if "$ref" in key:
                 yield from walk(found["definitions"][key["$ref"].rpartition("/")[2]], (*path, name))
-            elif key.get("type") in ("number", "integer"):
+            elif key.get("type") in ("number", "integer", ["number", "string"]):
                 yield (*path, name), key
             elif "items" in key and "$ref" in key["items"]:
                 yield from walk(found["definitions"][key["items"]["$ref"].rpartition("/")[2]], (*path, name, 0))

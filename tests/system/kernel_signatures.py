@@ -93,7 +93,7 @@ def run_everything(folder: Path) -> None:
     for made in (packing, Packing(packing.centres.copy(), packing.radii.copy(), packing.box)):
         for model in (None, HydraulicRadius()):
             flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)
-            flow.forces, flow.pore_velocity, flow.to_fipy()
+            flow.forces, flow.pore_velocity, flow.to_fipy().mesh
 
 
 def run(folder: Path, command: str, name: str, text: str) -> None:

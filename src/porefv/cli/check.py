@@ -54,6 +54,7 @@ def run(options: argparse.Namespace) -> None:
 
 def scene_text(scene: FlowScene, packing: Packing) -> str:
     """What a scene asks for, and the packing it is about."""
+    from porefv.flow.regions import region_text
     from porefv.packing.box import WALLS
     from porefv.packing.memory_estimate import required
     from porefv.system.memory import available
@@ -79,6 +80,8 @@ def scene_text(scene: FlowScene, packing: Packing) -> str:
         ("box", f"{vector_text(box.lower)} to {vector_text(box.upper)} m"),
         ("fluid", f"viscosity {fluid.viscosity:g} Pa s, density {fluid.density:g} kg/m³"),
         ("walls", walls_text(walls)),
+        *(("source", f"{source.flow:g} m³/s in {region_text(source.region)}") for source in scene.sources),
+        *(("fixed pressure", f"{p.pressure:g} Pa in {region_text(p.region)}") for p in scene.pressures),
         ("flow", f"{flow.conductance.name}, solver {flow.solver}, gravity {vector_text(flow.gravity)} m/s²"),
         (
             "output",

@@ -72,6 +72,7 @@ def _summary_text(results: Results) -> str:
             *((name.replace("_", " "), count_text(count)) for name, count in unusual.items() if count),
         ]),
         ("Flow", _flow_rows(summary)),
+        ("Permeabilities along the axes", _axes_rows(summary)),
         ("Sample", _sample_rows(summary)),
         ("Forces on the spheres", _force_rows(summary)),
         ("Computation", [
@@ -114,6 +115,15 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("outside tested range", _outside(summary.get("reliability"))),
         ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
+    if any("inflow" in wall or "velocity" in wall for wall in summary["walls"].values()):
+        pressures = ", ".join(f"{name} {pressure:.6g}" for name, pressure in flow["wall_pressure"].items())
+        rows.append(("pressures of the walls", f"{pressures} Pa"))
+    for source in summary.get("sources", []):
+        rows.append(("source", f"{source['flow']:.6g} m³/s in {source['region']}"))
+    for fixed in summary.get("pressures", []):
+        rows.append(
+            ("fixed pressure", f"{fixed['pressure']:.6g} Pa in {fixed['region']}, flow {fixed['flow']:.6g} m³/s")
+        )
     if "permeability" in summary:
         rows += [
             ("permeability", f"{summary['permeability']:.6g} m²"),
@@ -128,6 +138,14 @@ def _inside(found: Mapping[str, Any] | None) -> str | None:
     if found is None or found["permeability"] is None:
         return None
     return f"permeability {found['permeability']:.6g} m², porosity {found['porosity']:.4f}, away from the walls"
+
+
+def _axes_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    if "permeabilities" not in summary:
+        return []
+    found = summary["permeabilities"]
+    rows = [(axis, f"{found[axis]:.6g} m²") for axis in "xyz"]
+    return [*rows, ("walls beside the flow", "slip" if found["slip"] else "no-slip")]
 
 
 def _outside(found: Mapping[str, float] | None) -> str | None:

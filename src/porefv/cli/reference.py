@@ -42,6 +42,7 @@ def run(options: argparse.Namespace) -> None:
     require_ngsolve()
     fineness = Options(options.order, options.mesh_size, options.delta, options.contacts, options.single)
     scene = FlowScene.read(options.scene)
+    scene.ensure_driven_by_pressures_of_walls()
     directory = scene.output.directory
     target = options.out or directory.with_name(f"{directory.name}_stokes.json")
     if options.out and not target.absolute().parent.is_dir():

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from porefv.cli.options import add_run_options
-from porefv.cli.text import count_text, path_text, say
+from porefv.cli.text import axes_text, count_text, path_text, say
 
 if TYPE_CHECKING:
     from porefv.results.reading import Results
@@ -42,6 +42,8 @@ def outcome_text(results: Results) -> str:
     found = [f"{count_text(summary['packing']['spheres'])} spheres, {count_text(summary['mesh']['pores'])} pores"]
     if "permeability" in summary:
         found.append(f"permeability {summary['permeability']:.6g} m²")
+    if "permeabilities" in summary:
+        found.append(f"permeabilities {axes_text(summary['permeabilities'])} m²")
     if "forces" in summary:
         found.append(f"force balance {summary['forces']['conservation_residual']:.1e}")
     return f"{', '.join(found)}; {summary['seconds']['total']:.2f} s\nresults in {path_text(results.directory)}"

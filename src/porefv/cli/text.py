@@ -58,10 +58,11 @@ def _no_output(reason: str | None) -> PorefvError:
 
 def walls_text(walls: Mapping[str, Mapping[str, Any]]) -> str:
     """Walls that have the same condition together."""
+    from porefv.flow.walls import condition_text
+
     groups: dict[str, list[str]] = {}
     for name, wall in walls.items():
-        kind = "no-flux" if wall["pressure"] is None else f"{wall['pressure']:g} Pa"
-        groups.setdefault(f"{kind}, {'slip' if wall['slip'] else 'no-slip'}", []).append(name)
+        groups.setdefault(f"{condition_text(wall)}, {'slip' if wall['slip'] else 'no-slip'}", []).append(name)
     return "; ".join(f"{' '.join(names)}: {kind}" for kind, names in groups.items())
 
 
@@ -86,6 +87,11 @@ def range_text(values: Iterable[float]) -> str:
 def vector_text(values: Iterable[float]) -> str:
     """Numbers with commas between them."""
     return ", ".join(f"{value:.6g}" for value in values)
+
+
+def axes_text(values: Mapping[str, float]) -> str:
+    """Values along x, y and z."""
+    return ", ".join(f"{axis} {values[axis]:.6g}" for axis in "xyz")
 
 
 def path_text(path: str | os.PathLike[str]) -> str:

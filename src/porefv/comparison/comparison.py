@@ -66,6 +66,7 @@ def compare(
         If the scene is not fit for use, or the resolved flow is asked for and not installed.
     """
     scene = FlowScene.read(scene_file)
+    scene.ensure_driven_by_pressures_of_walls()
     if not scene.walls.held.any():
         raise InputError(f"{scene_file}: no wall has a pressure, and nothing flows: there is nothing to compare")
     mesh = scene.pore_mesh()

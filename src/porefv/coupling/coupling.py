@@ -20,7 +20,7 @@ from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pressure import held_pressures
 from porefv.flow.pressure_on_grains import solid_pressure_weights
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
@@ -209,6 +209,7 @@ class Coupling:
     def _set_up(
         self, grains: GrainModel, walls: Walls, fluid: Fluid, conductance: ConductanceModel, settings: CouplingSettings
     ) -> None:
+        ensure_no_imposed_flow(walls)
         self.grains, self.walls, self.fluid = grains, walls, fluid
         self.conductance, self.settings = conductance, settings
         self.effort = Effort()
@@ -286,6 +287,7 @@ class Coupling:
 
     def set_walls(self, walls: Walls) -> None:
         """Change what walls are to the fluid. Pressures of walls that keep having one may change at every step."""
+        ensure_no_imposed_flow(walls)
         same = (np.isnan(walls.pressures) == np.isnan(self.walls.pressures)).all() and (
             walls.slip == self.walls.slip
         ).all()

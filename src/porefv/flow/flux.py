@@ -58,3 +58,8 @@ def wall_face_fluxes(mesh: PoreMesh, outflows: np.ndarray, held: np.ndarray) -> 
     total = np.bincount(pores, areas, mesh.n_pores)[pores]
     parts = np.divide(areas, total, out=np.zeros(len(pores)), where=total > 0.0)
     return parts * outflows[pores]
+
+
+def wall_fluxes(mesh: PoreMesh, face_flux: np.ndarray) -> np.ndarray:
+    """(6,): flux into the sample through each wall, from those through the wall faces (w,) [m³/s]."""
+    return np.bincount(mesh.wall_faces.walls, face_flux, 6)

@@ -12,7 +12,7 @@ from porefv.conductance.model import FORCE_SPLITS, ForceSplit
 from porefv.errors import InputError
 from porefv.flow.pressure import PressureField, as_field
 from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.mesh.throats import ThroatFacets
 from porefv.mesh.vectors import dot, vector_at
@@ -41,7 +41,8 @@ class Forces:
         the hydrostatic pressure on it (zero at the highest corner of the box). Walls of imposed pressure are open:
         they bear none but the hydrostatic part.
     thrust : (3,) array
-        Force of the imposed pressures on the ends of the sample: what all pressure and viscous forces add up to.
+        Force of the imposed pressures on the ends of the sample: what all pressure and viscous forces add up to. It
+        is so with sources, too, because fluid is injected without momentum.
     scale : float
         Pressure range times section: what forces are measured against.
     """
@@ -124,6 +125,7 @@ def grain_forces(
     InputError
         For an unknown split, or pressures of the wrong shape or not finite.
     """
+    ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)
     relative, reference = field.relative, field.reference
     n = mesh.n_spheres

@@ -20,7 +20,15 @@ GIVEN_TOLERANCE = 1e-6
 BALANCED = 1e-3
 
 
-def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarray, walls: Walls) -> PressureField:
+def given_pressure(
+    mesh: PoreMesh,
+    conductances: np.ndarray,
+    pressure: np.ndarray,
+    walls: Walls,
+    *,
+    sources: np.ndarray | None = None,
+    inside: np.ndarray | None = None,
+) -> PressureField:
     """A pressure field found elsewhere, with the imbalance that it leaves.
 
     Parameters
@@ -31,6 +39,8 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     pressure : (n_pores,) array
         Pressure of each pore; on walls of imposed pressure the imposed one, to `GIVEN_TOLERANCE` of their range [Pa].
     walls : Walls
+    sources, inside
+        As of `porefv.flow.pressure.solve_pressure`.
 
     Raises
     ------
@@ -38,8 +48,8 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
         For pressures of the wrong shape, not finite, or other than those imposed.
     """
     pressure = check_by_pore(mesh, pressure)
-    reference = reference_pressure(walls)
-    imposed = held_pressures(mesh, walls.pressures)
+    reference = reference_pressure(walls, inside)
+    imposed = held_pressures(mesh, walls.pressures, inside)
     free = np.isnan(imposed)
     known = imposed[~free]
     span = float(np.ptp(known)) or float(np.ptp(pressure)) or abs(reference) or 1.0
@@ -53,7 +63,7 @@ def given_pressure(mesh: PoreMesh, conductances: np.ndarray, pressure: np.ndarra
     isolated = ~reached(mesh.throats.pores, conductances, ~free)
     field = replace(as_field(mesh, pressure - reference), reference=reference, isolated=isolated)
     flux = fluxes(mesh, conductances, field)
-    outflow = net_outflows(mesh, flux)
+    outflow = net_outflows(mesh, flux) - (0.0 if sources is None else sources)
     lost, through = float(np.abs(outflow[free]).sum()), 0.5 * float(np.abs(outflow[~free]).sum())
     imbalance = lost / (through or float(np.abs(flux).sum()) or 1.0)
     if imbalance > BALANCED:

@@ -16,11 +16,13 @@ import numpy as np
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
-from porefv.errors import InputError
+from porefv.errors import InputError, counted
 from porefv.flow.fluid import Fluid
-from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes
+from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes, wall_fluxes
 from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.given_pressure import given_pressure
+from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
+from porefv.flow.inside import FixedPressure, FlowSource, ImposedInside, check_imposed, imposed_inside
 from porefv.flow.interior import Interior, interior
 from porefv.flow.pressure import (
     PressureField,
@@ -35,7 +37,7 @@ from porefv.flow.reliability import Reliability, reliability
 from porefv.flow.sizes import ConstrictionSizes, PoreSizes, constriction_sizes, pore_sizes
 from porefv.flow.tortuosity import hydraulic_tortuosity
 from porefv.flow.velocity import darcy_velocity, pore_velocities
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Walls, condition_text, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
@@ -59,12 +61,17 @@ class PoreFlow(FixedInputs):
     ----------
     mesh : PoreMesh or Packing
     walls : Walls
-        Condition on each wall; at least one must hold a pressure.
+        Condition on each wall. At least one must have a pressure, unless there are fixed pressures, or imposed flows
+        that add up to zero.
     fluid : Fluid
     conductance : ConductanceModel, optional
         `SectionFriction()` by default; `HydraulicRadius()` is the model of C12.
     gravity : (3,) sequence of float
         Acceleration of gravity, for buoyancy [m/s²].
+    sources : sequence of FlowSource
+        Flows into regions of the packing.
+    fixed_pressures : sequence of FixedPressure
+        Pressures of regions of the packing.
     solver, tolerance
         See `porefv.solvers.solver.Solver`.
 
@@ -83,6 +90,8 @@ class PoreFlow(FixedInputs):
         conductance: ConductanceModel | None = None,
         *,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        sources: Sequence[FlowSource] = (),
+        fixed_pressures: Sequence[FixedPressure] = (),
         solver: str = "auto",
         tolerance: float = TOLERANCE,
     ):
@@ -98,12 +107,14 @@ class PoreFlow(FixedInputs):
         self.fluid = fluid if fluid is not None else Fluid()
         self.conductance = ensure_model(conductance) if conductance is not None else AUTO()
         self.gravity = three_numbers(gravity, "gravity", "m/s²")
+        self.sources = tuple(sources)
+        self.fixed_pressures = tuple(fixed_pressures)
         self.solver = solver
         self.tolerance = tolerance
         self.timings: dict[str, float] = {}
         if np.abs(self.gravity).max() > MOST:
             raise InputError(f"gravity must be at most {MOST:g} m/s² along each axis, not {gravity!r}")
-        self._reference = reference_pressure(walls)
+        check_imposed(walls, self.mesh.box, self.sources, self.fixed_pressures)
         self._given: PressureField | None = None
 
     @classmethod
@@ -116,6 +127,8 @@ class PoreFlow(FixedInputs):
         conductance: ConductanceModel | None = None,
         *,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        sources: Sequence[FlowSource] = (),
+        fixed_pressures: Sequence[FixedPressure] = (),
     ) -> PoreFlow:
         """The flow of a pressure found elsewhere, for instance by FiPy: its fluxes, forces and files.
 
@@ -125,8 +138,9 @@ class PoreFlow(FixedInputs):
         pressure : (n_pores,) array
             Piezometric pressure of each pore [Pa]. Pores on walls of imposed pressure must have that pressure, to
             1e-6 of the range of the imposed pressures.
-        walls, fluid, conductance, gravity
-            As of `PoreFlow`: those with which the pressure was found.
+        walls, fluid, conductance, gravity, sources, fixed_pressures
+            As of `PoreFlow`: those with which the pressure was found. In place of imposed flows, walls must have
+            pressures, such as `walls_at_pressures` has.
 
         Warns
         -----
@@ -136,7 +150,7 @@ class PoreFlow(FixedInputs):
         Raises
         ------
         InputError
-            For pressures of the wrong shape, not finite, or other than those imposed.
+            For pressures of the wrong shape, not finite, or other than those imposed; for a wall of imposed flow.
 
         Examples
         --------
@@ -145,27 +159,85 @@ class PoreFlow(FixedInputs):
         >>> np.allclose(same.forces.total, flow.forces.total)
         True
         """
-        flow = cls(mesh, walls, fluid, conductance, gravity=gravity)
-        flow._given = given_pressure(flow.mesh, flow.conductances, pressure, walls)
+        ensure_no_imposed_flow(walls)
+        flow = cls(
+            mesh, walls, fluid, conductance, gravity=gravity, sources=sources, fixed_pressures=fixed_pressures
+        )  # fmt: skip
+        inside, injected = flow._inside_pressures, flow._sources
+        flow._given = given_pressure(flow.mesh, flow.conductances, pressure, walls, sources=injected, inside=inside)
         return flow
 
     # ---- pressure -----------------------------------------------------------------------------------------------
 
     @lazy_property
+    def _inside(self) -> ImposedInside | None:
+        """What regions impose on each pore; None without regions."""
+        if not (self.sources or self.fixed_pressures):
+            return None
+        return imposed_inside(self.mesh, self.walls, self.sources, self.fixed_pressures)
+
+    @property
+    def _sources(self) -> np.ndarray | None:
+        """(n_pores,): volume injected into each pore per unit time; None without sources [m³/s]."""
+        return self._inside.sources if self.sources and self._inside is not None else None
+
+    @property
+    def flow_of_sources(self) -> np.ndarray:
+        """(n_pores,): volume that sources inject into each pore per unit time [m³/s]."""
+        return np.zeros(self.mesh.n_pores) if self._sources is None else self._sources
+
+    @property
+    def _inside_pressures(self) -> np.ndarray | None:
+        """(n_pores,): fixed pressure of each pore, NaN where there is none; None without fixed pressures [Pa]."""
+        return self._inside.pressures if self.fixed_pressures and self._inside is not None else None
+
+    @lazy_property
+    def _at_walls(self) -> FlowAtWalls | None:
+        """The flow with pressures found at walls of imposed flow; None where no wall has such."""
+        if not self.walls.imposes_flow.any():
+            return None
+        conductances = self.conductances
+        with Timer(self.timings, "solve"):
+            return solve_imposed_flow(
+                self.mesh, conductances, self.walls, sources=self._sources, inside=self._inside_pressures,
+                solver=self.solver, tolerance=self.tolerance,
+            )  # fmt: skip
+
+    @property
+    def walls_at_pressures(self) -> Walls:
+        """The walls, with the pressures that were found in place of imposed flows."""
+        return self.walls if self._at_walls is None else self._at_walls.walls
+
+    @property
+    def wall_pressure(self) -> dict[str, float]:
+        """Pressure of each wall that fluid passes, imposed or found from the imposed flow [Pa]."""
+        walls = self.walls_at_pressures
+        return {name: wall.pressure for name, wall in zip(WALLS, walls, strict=True) if wall.pressure is not None}
+
+    @lazy_property
+    def _reference(self) -> float:
+        """The lowest pressure of walls and regions [Pa]."""
+        if self._at_walls is not None:
+            return self._at_walls.field.reference
+        return reference_pressure(self.walls, self._inside_pressures)
+
+    @lazy_property
     def _held(self) -> np.ndarray:
         """Imposed pressures less the lowest of them."""
-        return held_pressures(self.mesh, self.walls.pressures - self._reference)
+        on_walls = self.walls.pressures - self._reference if self._at_walls is None else self._at_walls.relative
+        inside = self._inside_pressures
+        return held_pressures(self.mesh, on_walls, None if inside is None else inside - self._reference)
 
     @property
     def pores_of_several_pressures(self) -> np.ndarray:
         """(n_pores,) bool: pores that touch walls of different imposed pressures."""
-        return pores_of_several_pressures(self.mesh, self.walls)
+        return pores_of_several_pressures(self.mesh, self.walls_at_pressures)
 
     @property
     def imposed_pressures(self) -> np.ndarray:
-        """(n_pores,): imposed pressure of the pores on pressure walls, NaN elsewhere [Pa].
+        """(n_pores,): imposed pressure of the pores on pressure walls and of fixed pressure, NaN elsewhere [Pa].
 
-        Pores that touch several pressure walls take the mean of theirs.
+        Pores that touch several pressure walls take the mean of theirs. A wall of imposed flow has the pressure found.
         """
         return self._held + self._reference
 
@@ -180,9 +252,14 @@ class PoreFlow(FixedInputs):
         """The pressure field, with the solver's report and the isolated pores."""
         if self._given is not None:
             return self._given
+        if self._at_walls is not None:
+            return self._at_walls.field
         conductances = self.conductances
         with Timer(self.timings, "solve"):
-            return solve_pressure(self.mesh, conductances, self.walls, solver=self.solver, tolerance=self.tolerance)
+            return solve_pressure(
+                self.mesh, conductances, self.walls, sources=self._sources, inside=self._inside_pressures,
+                solver=self.solver, tolerance=self.tolerance,
+            )  # fmt: skip
 
     @lazy_property
     def pressure(self) -> np.ndarray:
@@ -191,7 +268,11 @@ class PoreFlow(FixedInputs):
 
     @lazy_property
     def _acting(self) -> PressureField:
-        return acting_pressure(self.mesh, self.conductance, self.conductances, self.walls, self.solution)
+        solution = self.solution
+        return acting_pressure(
+            self.mesh, self.conductance, self.conductances, self.walls_at_pressures, solution,
+            inside=self._inside_pressures,
+        )  # fmt: skip
 
     @property
     def acting_pressure(self) -> np.ndarray:
@@ -216,25 +297,53 @@ class PoreFlow(FixedInputs):
         return fluxes(self.mesh, self.conductances, self.solution)
 
     @lazy_property
+    def _outflow_of_pores(self) -> np.ndarray:
+        """(n_pores,): what each pore gives to its neighbours, less what sources inject into it [m³/s]."""
+        outflows = net_outflows(self.mesh, self.flux)
+        return outflows if self._sources is None else outflows - self._sources
+
+    @lazy_property
     def _face_flux(self) -> np.ndarray:
         """(w,): flux into the sample through each wall face [m³/s]."""
-        return wall_face_fluxes(self.mesh, net_outflows(self.mesh, self.flux), self.walls.held)
+        return wall_face_fluxes(self.mesh, self._outflow_of_pores, self.walls_at_pressures.held)
 
     @property
     def wall_flux(self) -> dict[str, float]:
         """Flux into the sample through each wall [m³/s]; zero through impervious ones."""
-        totals = np.bincount(self.mesh.wall_faces.walls, self._face_flux, 6)
+        totals = wall_fluxes(self.mesh, self._face_flux)
         return {name: float(q) for name, q in zip(WALLS, totals, strict=True)}
 
     @property
+    def fixed_pressure_flux(self) -> list[float]:
+        """Flux into the sample through the pores of each fixed pressure [m³/s].
+
+        A pore of several fixed pressures counts with the first. Pores that are also on a wall of that pressure count
+        with the wall.
+        """
+        if not self.fixed_pressures or self._inside is None:
+            return []
+        number = np.where(self._on_passed_walls, -1, self._inside.number)
+        return np.bincount(number + 1, self._outflow_of_pores, len(self.fixed_pressures) + 1)[1:].tolist()
+
+    @property
+    def _on_passed_walls(self) -> np.ndarray:
+        """(n_pores,) bool: pores on walls that fluid passes."""
+        return ~np.isnan(held_pressures(self.mesh, self.walls_at_pressures.pressures))
+
+    @property
+    def _entering(self) -> list[float]:
+        """Flux into the sample through each wall, and with each source and fixed pressure [m³/s]."""
+        return [*self.wall_flux.values(), *self.fixed_pressure_flux, *(source.flow for source in self.sources)]
+
+    @property
     def inflow(self) -> float:
-        """Total flux through the walls where fluid enters [m³/s]."""
-        return sum(max(q, 0.0) for q in self.wall_flux.values())
+        """Total flux where fluid enters: through walls, and with sources and fixed pressures [m³/s]."""
+        return sum(max(q, 0.0) for q in self._entering)
 
     @property
     def outflow(self) -> float:
-        """Total flux through the walls where fluid leaves [m³/s]."""
-        return sum(max(-q, 0.0) for q in self.wall_flux.values())
+        """Total flux where fluid leaves: through walls, and with sources and fixed pressures [m³/s]."""
+        return sum(max(-q, 0.0) for q in self._entering)
 
     @property
     def imbalance(self) -> float:
@@ -249,10 +358,13 @@ class PoreFlow(FixedInputs):
         Raises
         ------
         InputError
-            If the pressure walls are not one pair of opposite walls at different pressures.
+            If the walls that fluid passes are not one pair of opposite walls at different pressures, or there are
+            sources or fixed pressures.
         """
+        if self.sources or self.fixed_pressures:
+            raise InputError("permeability is that between two walls, without sources and fixed pressures")
         axis = self.walls.axis
-        pressures = self.walls.pressures
+        pressures = self.walls.pressures if self._at_walls is None else self._at_walls.relative
         if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
             raise InputError(
                 "permeability needs exactly two pressure walls, opposite each other and at different pressures"
@@ -270,7 +382,14 @@ class PoreFlow(FixedInputs):
     @lazy_property
     def pore_velocity(self) -> np.ndarray:
         """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
-        return ensure_finite(pore_velocities(self.mesh, self.flux, self._face_flux), "velocities")
+        injected = None
+        if self._inside is not None:  # all that does not come through a wall
+            through_walls = np.bincount(
+                self.mesh.cell_pore[self.mesh.wall_faces.cells], self._face_flux, self.mesh.n_pores
+            )
+            injected = net_outflows(self.mesh, self.flux) - through_walls
+        velocities = pore_velocities(self.mesh, self.flux, self._face_flux, injected)
+        return ensure_finite(velocities, "velocities")
 
     @property
     def closing_error(self) -> float:
@@ -289,7 +408,7 @@ class PoreFlow(FixedInputs):
         images = throats.mirror_images(self.walls.slip)[doubtful]
         radii = np.sqrt(images * throats.areas[doubtful] / np.pi)
         holes = radii**3 / (3.0 * self.fluid.viscosity * images)
-        range_ = max(float(np.nanmax(self._held)), np.finfo(float).tiny)
+        range_ = float(np.nanmax(self._held)) or float(np.ptp(self.solution.relative)) or np.finfo(float).tiny
         drop = self.solution.drops(throats.pores) / range_
         missing = float((holes * drop[doubtful] ** 2).sum())
         power = float((self.conductances * drop**2).sum())
@@ -317,6 +436,8 @@ class PoreFlow(FixedInputs):
     @lazy_property
     def darcy_velocity(self) -> np.ndarray:
         """(3,): mean velocity over the box, grains at rest included (`flow.velocity.darcy_velocity`) [m/s]."""
+        if self._inside is not None:  # fluid enters inside the box, too
+            return (self.pore_velocity * self.mesh.pore_volumes[:, None]).sum(axis=0) / self.mesh.box.volume
         return darcy_velocity(self.mesh, self._face_flux)
 
     @property
@@ -333,8 +454,10 @@ class PoreFlow(FixedInputs):
         InputError
             If the pressure walls are not one pair of opposite walls.
         """
-        if self.walls.axis is None:
-            raise InputError("tortuosity needs exactly two pressure walls, opposite each other")
+        if self.walls.axis is None or self._inside is not None:
+            raise InputError(
+                "tortuosity needs exactly two pressure walls, opposite each other, and no regions that drive"
+            )
         return hydraulic_tortuosity(self.mesh, self.flux, self._face_flux, self.walls.axis)
 
     @lazy_property
@@ -365,7 +488,7 @@ class PoreFlow(FixedInputs):
             forces = grain_forces(
                 self.mesh,
                 self._acting,
-                self.walls,
+                self.walls_at_pressures,
                 self.conductance.force_split,
                 weight=self.fluid.density * self.gravity,
             )
@@ -374,10 +497,9 @@ class PoreFlow(FixedInputs):
 
     def to_fipy(self) -> FipyProblem:
         """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
-        from porefv.fipy.pore_mesh import FipyPoreMesh
         from porefv.fipy.pressure_problem import FipyProblem
 
-        return FipyProblem(self, FipyPoreMesh(self.mesh, ~np.isnan(self._held)))
+        return FipyProblem(self)
 
     def to_openpnm(self) -> dict[str, np.ndarray]:
         """The network with its conductances in the names of OpenPNM (see `porefv.export.openpnm_network`)."""
@@ -388,6 +510,8 @@ class PoreFlow(FixedInputs):
     # ---- bookkeeping --------------------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        held = ", ".join(f"{name} {wall.pressure:g} Pa" for name, wall in zip(WALLS, self.walls, strict=True)
-                         if wall.pressure is not None)  # fmt: skip
-        return f"PoreFlow({self.mesh!r}, {self.conductance.name}, {held})"
+        passed = [f"{name} {condition_text(vars(wall))}" for name, wall in zip(WALLS, self.walls, strict=True)
+                  if wall.pressure is not None or wall.imposes_flow]  # fmt: skip
+        inside = [counted(len(given), name) for given, name in
+                  ((self.sources, "source"), (self.fixed_pressures, "fixed pressure")) if given]  # fmt: skip
+        return f"PoreFlow({', '.join([repr(self.mesh), self.conductance.name, *passed, *inside])})"

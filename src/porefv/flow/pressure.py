@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from porefv.conductance.conductances import check_conductances
 from porefv.errors import InputError, counted
-from porefv.flow.walls import Walls
+from porefv.flow.inside import refuse_sources_without_outlet
+from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
-from porefv.solvers.pressure_equation import solve_network
+from porefv.solvers.pressure_equation import reached, solve_network
 from porefv.solvers.solver import TOLERANCE, SolverReport
 from porefv.system.number_checks import one_value_each
 
@@ -78,10 +79,11 @@ def check_by_pore(mesh: PoreMesh, values: ArrayLike, what: str = "pressure") -> 
     return found
 
 
-def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
+def held_pressures(mesh: PoreMesh, pressures: np.ndarray, inside: np.ndarray | None = None) -> np.ndarray:
     """(n_pores,): pressure of the pores on walls of given pressure (6,), NaN elsewhere [Pa].
 
-    Pores that touch several such walls take the mean of theirs.
+    Pores that touch several such walls take the mean of theirs. Pores with a pressure `inside`, (n_pores,), NaN
+    elsewhere, have that [Pa].
     """
     faces = mesh.wall_faces
     held = ~np.isnan(pressures[faces.walls])
@@ -89,7 +91,8 @@ def held_pressures(mesh: PoreMesh, pressures: np.ndarray) -> np.ndarray:
     pairs = np.unique(np.stack([pores, faces.walls[held]], axis=1), axis=0)
     count = np.bincount(pairs[:, 0], minlength=mesh.n_pores)
     total = np.bincount(pairs[:, 0], pressures[pairs[:, 1]], mesh.n_pores)
-    return np.divide(total, count, out=np.full(mesh.n_pores, np.nan), where=count > 0)
+    found = np.divide(total, count, out=np.full(mesh.n_pores, np.nan), where=count > 0)
+    return found if inside is None else np.where(np.isnan(inside), found, inside)
 
 
 def pores_of_several_pressures(mesh: PoreMesh, walls: Walls) -> np.ndarray:
@@ -104,17 +107,18 @@ def pores_of_several_pressures(mesh: PoreMesh, walls: Walls) -> np.ndarray:
     return lowest < highest
 
 
-def reference_pressure(walls: Walls) -> float:
-    """The lowest imposed pressure [Pa].
+def reference_pressure(walls: Walls, inside: np.ndarray | None = None) -> float:
+    """The lowest pressure imposed on walls, and `inside` on pores, (n_pores,), NaN where there is none [Pa].
 
     Raises
     ------
     InputError
-        If no wall has a pressure.
+        If there is none.
     """
-    if not walls.held.any():
+    imposed = walls.pressures if inside is None else np.concatenate([walls.pressures, inside])
+    if np.isnan(imposed).all():
         raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
-    return float(np.nanmin(walls.pressures))
+    return float(np.nanmin(imposed))
 
 
 def solve_pressure(
@@ -123,6 +127,7 @@ def solve_pressure(
     walls: Walls,
     *,
     sources: np.ndarray | None = None,
+    inside: np.ndarray | None = None,
     solver: str = "auto",
     tolerance: float = TOLERANCE,
 ) -> PressureField:
@@ -134,17 +139,20 @@ def solve_pressure(
     conductances : (t,) array
         K of each throat [m³/(Pa s)], from `porefv.conductance.conductances` or elsewhere; zero where closed.
     walls : Walls
-        At least one must have a pressure.
+        At least one must have a pressure, if no pore has one `inside`. For walls of imposed flow see
+        `porefv.flow.solve_imposed_flow`.
     sources : (n_pores,) array, optional
         Volume injected into each pore per unit time. What is injected into a pore on a wall of imposed pressure leaves
         through the wall, and changes no pressure [m³/s].
+    inside : (n_pores,) array, optional
+        Pressure imposed on pores, NaN where there is none [Pa].
     solver, tolerance
         See `porefv.solvers.Solver`.
 
     Raises
     ------
     InputError
-        If no wall has a pressure, or an argument has the wrong shape.
+        If no wall has a pressure, a wall has an imposed flow, or an argument has the wrong shape.
     ComputationError
         If the solver fails, or an isolated pore has a source.
 
@@ -158,11 +166,16 @@ def solve_pressure(
     conductances = check_conductances(mesh, conductances)
     if sources is not None:
         sources = check_by_pore(mesh, sources, "sources")
-    reference = reference_pressure(walls)
+    ensure_no_imposed_flow(walls)
+    reference = reference_pressure(walls, inside)
+    relative = None if inside is None else inside - reference
+    held = held_pressures(mesh, walls.pressures - reference, relative)
+    if sources is not None and sources.any():
+        refuse_sources_without_outlet(mesh, sources, reached(mesh.throats.pores, conductances, ~np.isnan(held)))
     found = solve_network(
         mesh.throats.pores,
         conductances,
-        held_pressures(mesh, walls.pressures - reference),
+        held,
         links=lambda: mesh.throats.areas,
         sources=sources,
         solver=solver,

@@ -13,7 +13,7 @@ import numpy as np
 
 from porefv.conductance.model import ConductanceModel
 from porefv.flow.pressure import PressureField, as_field, held_pressures
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 
 # Where between the centre of a pore and its Laguerre vertex the pressure is that acts on the grains: fitted to the
@@ -77,6 +77,8 @@ def acting_pressure(
     conductances: np.ndarray,
     walls: Walls,
     pressure: PressureField | np.ndarray,
+    *,
+    inside: np.ndarray | None = None,
 ) -> PressureField:
     """The pressure that acts on the grains of each pore, from the pressures of the pores.
 
@@ -90,9 +92,12 @@ def acting_pressure(
     walls : Walls
     pressure : PressureField, or (n_pores,) array
         Piezometric pressure of each pore [Pa].
+    inside : (n_pores,) array, optional
+        Pressure imposed on pores, NaN where there is none [Pa].
     """
+    ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)
-    held = ~np.isnan(held_pressures(mesh, walls.pressures))
+    held = ~np.isnan(held_pressures(mesh, walls.pressures, inside))
     weights = solid_pressure_weights(mesh, model, conductances, walls.slip, held)
     if weights is None:
         return field

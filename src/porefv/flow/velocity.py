@@ -7,10 +7,13 @@ import numpy as np
 from porefv.mesh.pore_mesh import PoreMesh
 
 
-def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> np.ndarray:
-    """Mean velocity of each pore, V u = ∫ u dV = ∮ x (u·n) dS for a field without divergence.
+def pore_velocities(
+    mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, injected: np.ndarray | None = None
+) -> np.ndarray:
+    """Mean velocity of each pore, V u = ∫ u dV = ∮ x (u·n) dS - ∫ x (∇·u) dV.
 
-    Each throat's flux is taken to pass at the centroid of its facet, each wall face's at its own.
+    Each throat's flux is taken to pass at the centroid of its facet, each wall face's at its own. What is injected
+    into a pore enters at the mean of the centroids of its throats, weighted by their areas.
 
     Parameters
     ----------
@@ -19,6 +22,8 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
         Flux of each throat, from its first pore to its second [m³/s].
     face_flux : (w,) array
         Flux into the sample through each wall face [m³/s].
+    injected : (n_pores,) array, optional
+        Volume injected into each pore per unit time, other than through walls [m³/s].
 
     Returns
     -------
@@ -38,8 +43,19 @@ def pore_velocities(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray) -> 
             - np.bincount(j, through, mesh.n_pores)
             - np.bincount(pores, face_flux * faces.centroids[:, axis], mesh.n_pores)
         )
+        if injected is not None:
+            weighted = throats.areas * centres[:, axis]
+            moments[:, axis] -= (
+                injected * _by_pore(mesh, weighted) / np.maximum(_by_pore(mesh, throats.areas), np.finfo(float).tiny)
+            )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)
+
+
+def _by_pore(mesh: PoreMesh, values: np.ndarray) -> np.ndarray:
+    """(n_pores,): sums over the throats of each pore, of values of throats (t,)."""
+    i, j = mesh.throats.pores.T
+    return np.bincount(i, values, mesh.n_pores) + np.bincount(j, values, mesh.n_pores)
 
 
 def darcy_velocity(mesh: PoreMesh, face_flux: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.errors import InputError, MissingExtraError
-from porefv.flow.walls import Walls
+from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.resolved.fluid_geometry import REGULARISATIONS, contacts
 from porefv.resolved.reference import Run, StokesReference, Values, read_off, versions
@@ -98,6 +98,7 @@ def stokes_reference(
     require_ngsolve()
     options = options or Options()
     progress = progress or Progress(STAGES, quiet=True)
+    ensure_no_imposed_flow(walls)
     if np.isnan(walls.pressures).all():
         raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
     levels = [(options.mesh_size, options.delta)]

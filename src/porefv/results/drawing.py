@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from porefv.export.pictures import SIZE, picture
 from porefv.flow.walls import Walls
+from porefv.packing.box import WALLS
 from porefv.results.reading import Results
 from porefv.system.atomic_files import atomic_write, locked, picture_target
 
@@ -31,7 +36,16 @@ def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SI
         picture(
             results.spheres,
             results.pores,
-            walls=Walls.from_mapping(summary.get("walls", {})),
+            walls=_walls_at_pressures(summary),
             title=title,
             size=size,
         ).screenshot(temporary)
+
+
+def _walls_at_pressures(summary: Mapping[str, Any]) -> Walls:
+    """The walls of results, with the pressures that were found in place of imposed flows."""
+    walls = Walls.from_mapping(summary.get("walls", {}))
+    if not walls.imposes_flow.any():
+        return walls
+    found = summary["flow"]["wall_pressure"]
+    return walls.with_pressures(np.array([found.get(name, np.nan) for name in WALLS]))

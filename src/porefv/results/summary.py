@@ -16,6 +16,7 @@ import numpy as np
 
 from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import ComputationError, printable
+from porefv.flow.regions import region_text
 from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
 from porefv.packing.free_space import WallLayer, wall_layers
@@ -23,14 +24,17 @@ from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
 
 if TYPE_CHECKING:
+    from porefv.flow.directional_permeabilities import DirectionalPermeabilities
     from porefv.flow.pore_flow import PoreFlow
     from porefv.mesh.pore_mesh import PoreMesh
 
 UNITS = {
-    "permeability": "m2", "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
-    "wall_flux": "m3/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
+    "permeability": "m2", "permeabilities": "m2",
+    "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
+    "wall_flux": "m3/s", "wall_pressure": "Pa",
+    "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
-    "pore_sizes": "m", "constriction_sizes": "m", "velocity": "m/s", "planes": "m3/s", "tortuosity": "1",
+    "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1",
     "profile": "1",
 }  # fmt: skip
 
@@ -44,6 +48,7 @@ def summary_json(
     table_format: str,
     seconds: Mapping[str, float],
     sample: Mapping[str, Any],
+    permeabilities: DirectionalPermeabilities | None = None,
     scene: str | None = None,
     packing: str | None = None,
 ) -> str:
@@ -60,6 +65,7 @@ def summary_json(
         Wall time of each stage.
     sample : mapping
         What `quantity_summaries` returns.
+    permeabilities : DirectionalPermeabilities, optional
     scene, packing : str, optional
         Names of the files.
     """
@@ -70,6 +76,7 @@ def summary_json(
         "packing": {"file": packing and printable(packing), **_packing(mesh)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
+        **({} if permeabilities is None else {"permeabilities": vars(permeabilities)}),
         **sample,
         "seconds": {**seconds, "total": sum(seconds.values())},
         "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
@@ -120,7 +127,9 @@ def _mesh(mesh: PoreMesh) -> dict[str, Any]:
 
 def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dict[str, Any]:
     walls = {
-        name: {"pressure": wall.pressure, "slip": bool(wall.slip)} for name, wall in zip(WALLS, flow.walls, strict=True)
+        name: {"pressure": wall.pressure, "slip": bool(wall.slip)}
+        | {key: value for key in ("inflow", "velocity") if (value := getattr(wall, key)) is not None}
+        for name, wall in zip(WALLS, flow.walls, strict=True)
     }
     found: dict[str, Any] = {
         "fluid": {"viscosity": flow.fluid.viscosity, "density": flow.fluid.density},
@@ -134,10 +143,18 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             "imbalance": flow.imbalance,
             "closing_error": flow.closing_error,
             "wall_flux": flow.wall_flux,
+            "wall_pressure": flow.wall_pressure,
         },
         "unusual": _unusual(flow),
         "solver": {name: _known(value) for name, value in vars(flow.solver_report).items()},
     }
+    if flow.sources:
+        found["sources"] = [{"region": region_text(s.region), "flow": s.flow} for s in flow.sources]
+    if flow.fixed_pressures:
+        found["pressures"] = [
+            {"region": region_text(fixed.region), "pressure": fixed.pressure, "flow": flux}
+            for fixed, flux in zip(flow.fixed_pressures, flow.fixed_pressure_flux, strict=True)
+        ]
     if flow.conductance.name == SectionFriction.name:  # what the range is of
         found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -25,6 +25,11 @@ from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import InputError, OutOfRangeWarning
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
+from porefv.flow.directional_permeabilities import (
+    DirectionalPermeabilities,
+    directional_permeabilities,
+    slip_of_impervious_walls,
+)
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
@@ -44,7 +49,7 @@ from porefv.system.tables import check_table_format
 
 # What `write` computes unless it is told.
 USUAL_QUANTITIES = ("permeability", "pressure", "forces")
-QUANTITIES = (*USUAL_QUANTITIES, *SAMPLE_QUANTITIES)
+QUANTITIES = ("permeability", "permeabilities", *USUAL_QUANTITIES[1:], *SAMPLE_QUANTITIES)
 FILES = (
     "summary.json", *FORCE_FILES.values(), *(table.file for table in TABLES.values()),
     "pores.vtu", "spheres.vtp", "throats.vtp",
@@ -69,7 +74,8 @@ def write(
     directory : path
         Made with its parents; must not exist, or be empty.
     quantities : collection of str
-        Among `QUANTITIES`.
+        Among `QUANTITIES`. "permeabilities" is as of `directional_permeabilities`, with the slip of the walls that
+        fluid does not pass.
     vtk : bool
         Write pores.vtu, spheres.vtp and throats.vtp.
     table_format : str
@@ -89,7 +95,11 @@ def write(
         raise InputError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     with writing(directory, force=force, vtk=vtk, table_format=table_format) as folder:
         save(
-            folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, sections=sections
+            folder, flow.mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, sections=sections,
+            permeabilities=lambda: directional_permeabilities(
+                flow.mesh, flow.fluid, flow.conductance, slip=slip_of_impervious_walls(flow.walls),
+                solver=flow.solver, tolerance=flow.tolerance,
+            ),
         )  # fmt: skip
     return Path(directory)
 
@@ -134,12 +144,14 @@ def check_target(directory: str | PathLike[str], *, vtk: bool, table_format: str
 
 def stages(quantities: Collection[str], vtk: bool) -> tuple[str, ...]:
     """Stages of `save`, in order."""
+    driven = any(quantity != "permeabilities" for quantity in quantities)
     asked = {
-        "throats": bool(quantities),
-        "pressure": bool(quantities),
+        "throats": driven,
+        "pressure": driven,
         "forces": "forces" in quantities,
         "velocities": vtk and "pressure" in quantities,
         "quantities": bool(set(quantities) & set(SAMPLE_QUANTITIES)),
+        "permeabilities": "permeabilities" in quantities,
     }
     return ("triangulation", *(stage for stage, wanted in asked.items() if wanted), "writing")
 
@@ -154,6 +166,7 @@ def save(
     table_format: str,
     sections: Sections = TEN_LAYERS,
     progress: Progress | None = None,
+    permeabilities: Callable[[], DirectionalPermeabilities] | None = None,
     scene: str | None = None,
     packing: str | None = None,
 ) -> None:
@@ -170,6 +183,8 @@ def save(
         As for `write`.
     progress : Progress, optional
         Has the stages that `stages` returns; quiet by default.
+    permeabilities : function, optional
+        Computes the permeabilities along all axes, if they are asked for.
     scene, packing : str, optional
         Names of the files, for summary.json.
     """
@@ -194,6 +209,10 @@ def save(
             with progress.stage("quantities"):
                 tables = compute_tables(flow, quantities, sections)
                 sample = quantity_summaries(flow, quantities, tables, sections)
+    along_axes = None
+    if permeabilities is not None and "permeabilities" in quantities:
+        with progress.stage("permeabilities"):
+            along_axes = permeabilities()
     with progress.stage("writing"):
         if flow is not None and "forces" in quantities:
             write_forces(flow, folder / FORCE_FILES[table_format])
@@ -204,7 +223,7 @@ def save(
         warnings.warn(said, OutOfRangeWarning, stacklevel=2)
     text = summary_json(
         mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds,
-        sample=sample, scene=scene, packing=packing,
+        sample=sample, permeabilities=along_axes, scene=scene, packing=packing,
     )  # fmt: skip
     (folder / "summary.json").write_text(text, encoding="utf-8")
 

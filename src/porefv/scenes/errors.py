@@ -27,8 +27,17 @@ _EXPECTED = {
 
 def refused(message: str, *path: str | int) -> ValidationError:
     """What a validator raises: a message about the key at a path from the table that the validator is about."""
+    return ValidationError.from_exception_data("scene", [_refusal(message, *path)])
+
+
+def refused_keys(refusals: Iterable[tuple[str, str]]) -> ValidationError:
+    """As `refused`, of several keys of the table: a message and a key each."""
+    return ValidationError.from_exception_data("scene", [_refusal(message, key) for message, key in refusals])
+
+
+def _refusal(message: str, *path: str | int) -> InitErrorDetails:
     error = PydanticCustomError(REFUSED, "{message}", {"message": message})
-    return ValidationError.from_exception_data("scene", [InitErrorDetails(type=error, loc=path, input=None)])
+    return InitErrorDetails(type=error, loc=path, input=None)
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -7,13 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from porefv.conductance.model import ConductanceModel
-from porefv.errors import FreeSpaceWarning
+from porefv.errors import FreeSpaceWarning, InputError
+from porefv.flow.directional_permeabilities import (
+    DirectionalPermeabilities,
+    directional_permeabilities,
+    slip_of_impervious_walls,
+)
 from porefv.flow.fluid import Fluid
+from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.walls import Wall, Walls
+from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
 from porefv.packing.free_space import free_space, wall_layers
@@ -21,6 +27,7 @@ from porefv.packing.packing import Packing
 from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
 from porefv.scenes.errors import refused
+from porefv.scenes.region_tables import FixedPressureTable, SourceTable
 from porefv.scenes.shared_tables import (
     BoxOrFit,
     BoxTable,
@@ -44,14 +51,28 @@ class WallTable(Table):
     """What a wall does to the fluid."""
 
     pressure: float | None = key(
-        "imposed piezometric pressure. Without it the wall is impervious. Not for `lateral`", None, unit="Pa"
+        "imposed piezometric pressure. A wall with neither this nor an imposed flow is impervious. Not for `lateral`",
+        None,
+        unit="Pa",
     )
     slip: bool = key(
         "whether the fluid slips along the wall, as along a plane of symmetry. If not, the wall drags it", False
     )
 
+    inflow: float | None = key(
+        "instead of `pressure`: imposed flow into the sample, negative out of it. The wall has "
+        "[one pressure, which is found](boundary.md#a-flow-through-a-wall)",
+        None,
+        unit="m³/s",
+    )
+    velocity: float | None = key(
+        "instead of `inflow`: imposed Darcy velocity into the sample, which is the flow over the area of the wall",
+        None,
+        unit="m/s",
+    )
+
     def make(self) -> Wall:
-        return Wall(self.pressure, self.slip)
+        return Wall(self.pressure, self.slip, self.inflow, self.velocity)
 
 
 class WallsTable(SixWalls[Annotated[Wall, MadeFrom(WallTable)]]):
@@ -109,7 +130,8 @@ class FlowOutput(Table):
         "results",
     )
     quantities: Annotated[tuple[str, ...], Choices(QUANTITIES)] = key(
-        'what is computed: any of `"permeability"`, `"pressure"`, `"forces"`, and of the '
+        'what is computed: any of `"permeability"`, `"permeabilities"` (along x, y and z, see '
+        '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`, and of the '
         '[quantities of the sample](quantities.md) `"profile"`, `"pore_sizes"`, `"constriction_sizes"`, '
         '`"tortuosity"`, `"velocity"`, `"planes"`. An empty list computes the pores alone',
         ("permeability",),
@@ -144,6 +166,8 @@ class FlowScene(Scene):
         None: the box is in the packing file.
     fluid : Fluid
     walls : Walls
+    sources : tuple of FlowSource
+    pressures : tuple of FixedPressure
     mesh : MeshOptions
     flow : FlowOptions
     output : FlowOutput
@@ -165,40 +189,75 @@ class FlowScene(Scene):
     )
     fluid: Annotated[Fluid, MadeFrom(FluidTable)] = key("the table `[fluid]`: what fills the pores", {})
     walls: Annotated[Walls, MadeFrom(WallsTable)] = key("the table `[walls]`: what the walls do to the fluid", {})
+    sources: Annotated[tuple[Annotated[FlowSource, MadeFrom(SourceTable)], ...], Field(strict=False)] = key(
+        "a table `[[sources]]` for each flow into a region of the packing", (), shown="none"
+    )
+    pressures: Annotated[tuple[Annotated[FixedPressure, MadeFrom(FixedPressureTable)], ...], Field(strict=False)] = key(
+        "a table `[[pressures]]` for each region whose pores have a given pressure", (), shown="none"
+    )
     mesh: MeshOptions = key("the table `[mesh]`: tolerances of the mesh of pores", {})
     flow: Annotated[FlowOptions, MadeFrom(FlowTable)] = key("the table `[flow]`: how the flow is computed", {})
     output: FlowOutput = key("the table `[output]`: what is computed and written, and where", {})
 
     @model_validator(mode="after")
     def _is_driven(self) -> Self:
-        """The walls drive what is asked for."""
+        """The walls and regions drive what is asked for."""
         asked = self.output.quantities
-        held = [(name, wall) for name, wall in zip(WALLS, self.walls, strict=True) if wall.pressure is not None]
-        if asked and not held:
+        if "permeabilities" in asked:
+            try:
+                slip_of_impervious_walls(self.walls)
+            except InputError as error:
+                raise refused(str(error), "walls") from None
+        if not self.driven:
+            return self
+        passed = [
+            (name, wall)
+            for name, wall in zip(WALLS, self.walls, strict=True)
+            if wall.pressure is not None or wall.imposes_flow
+        ]
+        if not passed and not self.pressures:
             raise refused(
-                f"no wall has a pressure, and {', '.join(asked)} cannot be computed without. "
+                f"no wall has a pressure, and {', '.join(self.driven)} cannot be computed without. "
                 "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
             )
-        pressures = self.walls.pressures
-        axis = self.walls.axis
-        if "permeability" in asked and (axis is None or pressures[2 * axis] == pressures[2 * axis + 1]):
-            described = ", ".join(f"{name} at {wall.pressure:g} Pa" for name, wall in held)
-            raise refused(
-                "permeability needs exactly two pressure walls, opposite each other and at "
-                f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
-            )
+        axis, pressures = self.walls.axis, self.walls.pressures
+        if "permeability" in asked:
+            described = ", ".join(f"{name} at {condition_text(vars(wall))}" for name, wall in passed)
+            if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
+                raise refused(
+                    "permeability needs exactly two pressure walls, opposite each other and at "
+                    f"different pressures; there are {described}. Change [walls], or drop it from the quantities."
+                )
+            if self.sources or self.pressures:
+                raise refused(
+                    "permeability is that between two walls, without [[sources]] and [[pressures]]. Drop it from the "
+                    "quantities, or drop these tables."
+                )
         for quantity in ("profile", "planes"):
             if quantity in asked and axis is None and self.output.axis is None:
                 raise refused(
                     f"{quantity} needs an axis, and the pressure walls are not one pair of opposite walls. "
                     'Give in [output] for instance\naxis = "y"'
                 )
-        if "tortuosity" in asked and axis is None:
+        if "tortuosity" in asked and (axis is None or self.sources or self.pressures):
             raise refused(
-                "tortuosity needs exactly two pressure walls, opposite each other. Change [walls], or drop it from "
-                "the quantities."
+                "tortuosity needs exactly two pressure walls, opposite each other, and no regions that drive. "
+                "Change [walls], or drop it from the quantities."
             )
         return self
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """The quantities that need the flow of the walls and regions of the scene."""
+        return tuple(name for name in self.output.quantities if name != "permeabilities")
+
+    def ensure_driven_by_pressures_of_walls(self) -> None:
+        """InputError if anything but pressures of walls drives the flow."""
+        if self.walls.imposes_flow.any() or self.sources or self.pressures:
+            raise InputError(
+                f"{self.path or 'scene'}: only flows that pressures of walls drive can be compared and resolved; drop "
+                "imposed flows, [[sources]] and [[pressures]]"
+            )
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""
@@ -209,16 +268,28 @@ class FlowScene(Scene):
         return PoreMesh(self.read_packing() if packing is None else packing, **dict(self.mesh))
 
     def pore_flow(self, mesh: PoreMesh | None = None) -> PoreFlow:
-        """The flow through the packing: nothing is computed yet."""
-        return PoreFlow(
-            self.pore_mesh() if mesh is None else mesh,
-            self.walls,
-            self.fluid,
-            self.flow.conductance,
-            gravity=self.flow.gravity,
-            solver=self.flow.solver,
-            tolerance=self.flow.tolerance,
-        )
+        """The flow through the packing: nothing is computed yet.
+
+        Raises
+        ------
+        InputError
+            If what is imposed on walls and regions contradicts itself, or lies outside the box.
+        """
+        mesh = self.pore_mesh() if mesh is None else mesh
+        try:
+            return PoreFlow(
+                mesh, self.walls, self.fluid, self.flow.conductance, gravity=self.flow.gravity, sources=self.sources,
+                fixed_pressures=self.pressures, solver=self.flow.solver, tolerance=self.flow.tolerance,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(f"{self.path or 'scene'}: {error}") from None
+
+    def permeabilities(self, mesh: PoreMesh | None = None) -> DirectionalPermeabilities:
+        """Permeabilities along all axes, with the slip of the scene's walls that fluid does not pass."""
+        return directional_permeabilities(
+            self.pore_mesh() if mesh is None else mesh, self.fluid, self.flow.conductance,
+            slip=slip_of_impervious_walls(self.walls), solver=self.flow.solver, tolerance=self.flow.tolerance,
+        )  # fmt: skip
 
     def solve(self, *, force: bool = False, progress: Progress | None = None) -> Path:
         """Compute what `output` asks for, and write the results directory.
@@ -251,11 +322,11 @@ class FlowScene(Scene):
                 mesh = self.pore_mesh(packing)
                 _warn_of_free_space(packing)
             output.sections.check(output.quantities, self.walls, mesh.box)
-            flow = self.pore_flow(mesh) if output.quantities else None
+            flow = self.pore_flow(mesh) if self.driven else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
-                sections=output.sections, progress=progress, scene=str(self.path) if self.path else None,
-                packing=str(self.packing.file),
+                sections=output.sections, progress=progress, permeabilities=lambda: self.permeabilities(mesh),
+                scene=str(self.path) if self.path else None, packing=str(self.packing.file),
             )  # fmt: skip
         return output.directory
 
@@ -275,6 +346,8 @@ class FlowScene(Scene):
         check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
         mesh = self.pore_mesh()
         _warn_of_free_space(mesh.packing)
+        if self.driven:
+            self.pore_flow(mesh)
         self.output.sections.check(self.output.quantities, self.walls, mesh.box)
         return mesh.packing
 

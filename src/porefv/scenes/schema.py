@@ -34,8 +34,8 @@ class TomlSchema(GenerateJsonSchema):
         return self.generate_inner(schema["schema"])
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
-        # None and {} stand for keys and tables that are left out.
-        left_out = schema.get("default") in (None, {})
+        # None, {} and () stand for keys and tables that are left out.
+        left_out = schema.get("default") in (None, {}, ())
         return self.generate_inner(schema["schema"]) if left_out else super().default_schema(schema)
 
     def field_title_should_be_set(self, schema: Any) -> bool:
@@ -69,9 +69,19 @@ def _sentence(key: dict[str, Any]) -> dict[str, Any]:
     sentences = [text[0].upper() + text[1:]]
     sentences += [f"Unit: {extra['unit']}"] if extra["unit"] else []
     sentences += [f"Default: {extra['shown']}"] if extra["shown"] else []
-    return {"description": ". ".join(sentences).replace("`", "") + "."} | {
-        name: value for name, value in key.items() if name not in ("description", "allOf", *extra)
-    }
+    rest = {name: value for name, value in key.items() if name not in ("description", "allOf", *extra)}
+    return {"description": ". ".join(sentences).replace("`", "") + "."} | (_or_text(rest) if extra["unit"] else rest)
+
+
+def _or_text(key: dict[str, Any]) -> dict[str, Any]:
+    """A key of numbers where texts with a unit can stand, too: `porefv.scenes.units`."""
+    if key.get("type") == "number":
+        return key | {"type": ["number", "string"]}
+    if "items" in key:
+        return key | {"items": _or_text(key["items"])}
+    if "oneOf" in key:
+        return key | {"oneOf": [_or_text(kind) for kind in key["oneOf"]]}
+    return key
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

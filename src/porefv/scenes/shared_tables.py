@@ -75,8 +75,9 @@ class PackingFile(Table):
         "radius of all spheres of a file without radii", None, unit="m"
     )
     scale: Annotated[float, Limits("must be a positive number of m", above=0.0)] | None = key(
-        "factor by which lengths in the file, its box included, are multiplied to be in m",
+        "unit of lengths in the file, its box included: the factor by which they are multiplied to be in m",
         None,
+        unit="m",
         shown="by the unit that the file states, or 1",
     )
     frame: Integer | None = key("frame to read of a file with several: 0 is the first, -1 the last", None, shown="-1")
@@ -202,7 +203,8 @@ class LateralTable(Table):
     """What all walls that are not named do to the fluid."""
 
     advice: ClassVar[Mapping[str, str]] = {
-        "pressure": "the lateral walls have none; give it wall by wall (x_min = ...)"
+        name: "the lateral walls have none; give it wall by wall (x_min = ...)"
+        for name in ("pressure", "inflow", "velocity")
     }
 
     slip: bool = key(

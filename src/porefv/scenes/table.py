@@ -11,8 +11,9 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, PrivateAttr, V
 from pydantic_core import core_schema
 
 from porefv.errors import InputError
-from porefv.scenes.errors import input_error, refused, suggestion, tag
+from porefv.scenes.errors import input_error, refused, refused_keys, suggestion, tag
 from porefv.scenes.toml_file import SceneSource
+from porefv.scenes.units import has_text, in_unit
 
 
 class Table(BaseModel):
@@ -48,6 +49,23 @@ class Table(BaseModel):
         # TOML has no null: in plain data from Python, None stands for a key that is left out.
         given = {str(key): value for key, value in data.items() if value is not None}
         cls.check_keys(list(given))
+        return cls._in_units_of_keys(given)
+
+    @classmethod
+    def _in_units_of_keys(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The values, with texts such as "1 mm" as numbers in the units of their keys."""
+        refusals = []
+        for key, value in given.items():
+            extra = cls.model_fields[key].json_schema_extra
+            unit = extra["unit"] if isinstance(extra, dict) else ""
+            if not (unit and has_text(value)):
+                continue
+            try:
+                given[key] = in_unit(value, str(unit))
+            except ValueError as error:
+                refusals.append((str(error), key))
+        if refusals:
+            raise refused_keys(refusals)
         return given
 
 

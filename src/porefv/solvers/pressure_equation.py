@@ -83,16 +83,46 @@ def solve_network(
     rest = np.zeros(n)
     report = _solve_free(pairs, conductances, pressure, rest, free & ~isolated, sources, solver, tolerance)
     if isolated.any():
-        cut_off = ~reached(pairs, np.ones(len(pairs)), ~free)
-        if cut_off.any():
-            raise ComputationError(
-                f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
-                "that lead to an imposed pressure: their pressure is not defined"
-            )
-        weights = np.ones(len(pairs)) if links is None else links()
-        touching = isolated[pairs].any(axis=1)
-        _solve_free(pairs[touching], weights[touching], pressure, rest, isolated, np.zeros(n), "auto", tolerance)
+        solve_isolated(pairs, isolated, ~free, pressure, rest, links=links, tolerance=tolerance)
     return NetworkSolution(pressure, isolated, report, rest)
+
+
+def solve_isolated(
+    pairs: np.ndarray,
+    isolated: np.ndarray,
+    held: np.ndarray,
+    pressure: np.ndarray,
+    rest: np.ndarray,
+    *,
+    links: Callable[[], np.ndarray] | None = None,
+    tolerance: float = TOLERANCE,
+) -> None:
+    """Fill in the pressures of isolated pores from those of the others: see `links` of `solve_network`.
+
+    Parameters
+    ----------
+    pairs : (t, 2) int array
+    isolated, held : (n_pores,) bool arrays
+        Pores without a flowing path to an imposed pressure; pores of imposed pressure.
+    pressure, rest : (n_pores,) arrays
+        As of `NetworkSolution`; those of isolated pores are overwritten.
+    links, tolerance
+        As of `solve_network`.
+
+    Raises
+    ------
+    ComputationError
+        If neighbours do not lead to an imposed pressure.
+    """
+    cut_off = ~reached(pairs, np.ones(len(pairs)), held)
+    if cut_off.any():
+        raise ComputationError(
+            f"{np.count_nonzero(cut_off)} pores, the first of them {int(np.argmax(cut_off))}, have no neighbours "
+            "that lead to an imposed pressure: their pressure is not defined"
+        )
+    weights = np.ones(len(pairs)) if links is None else links()
+    touching = isolated[pairs].any(axis=1)
+    _solve_free(pairs[touching], weights[touching], pressure, rest, isolated, np.zeros(len(held)), "auto", tolerance)
 
 
 def reached(pairs: np.ndarray, weights: np.ndarray, sources: np.ndarray) -> np.ndarray:
