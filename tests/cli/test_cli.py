@@ -13,6 +13,8 @@ import pytest
 
 from porefv.cli.program import main
 from porefv.errors import ComputationError
+from porefv.packing.box import Box
+from porefv.packing.packing import Packing
 from porefv.scenes.flow_scene import FlowScene
 from porefv.system.progress import Progress
 
@@ -393,3 +395,44 @@ def test_numbers_of_a_summary_may_be_of_any_size(scene, capsys):
         assert main(["info", str(path.parent)]) in (0, 2)
         assert "defect" not in capsys.readouterr().err
         path.write_text(summary)
+
+
+# Packing files, and walls with free space
+
+
+def test_a_packing_file_is_described_checked_and_drawn(tmp_path, capsys):
+    path = DATA / "packings" / "n200_s1.csv"
+    assert main(["info", str(path)]) == 0
+    said = capsys.readouterr().out
+    for word in ("200, radii", "contacts", "porosity", "hidden spheres", "x_min", "reading"):
+        assert word in said
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().out.endswith("no errors\n")
+    assert main(["plot", str(path), "--out", str(tmp_path / "picture.png")]) == 0
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    header = "# box_lower = 0 0 0\n# box_upper = 1 1 1\nx,y,z,r\n"
+    (tmp_path / "twice.csv").write_text(header + "0.5,0.5,0.5,0.1\n" * 2)
+    assert main(["check", str(tmp_path / "twice.csv")]) == 2
+    assert "one sphere lies within another" in capsys.readouterr().err
+
+
+def test_free_space_is_told_and_taken_away(tmp_path, capsys):
+    packing = Packing.read(DATA / "packings" / "n2000_s1.csv")
+    packing.with_box(Box(packing.box.lower, packing.box.upper * [1, 1, 1.2])).write(tmp_path / "bed.csv")
+    scene = tmp_path / "scene.toml"
+    text = 'packing = "bed.csv"\n{}\n[walls]\nz_min = {{ pressure = 1.0 }}\nz_max = {{ pressure = 0.0 }}\n'
+    scene.write_text(text.format(""))
+    assert main(["check", str(scene)]) == 0
+    assert "z_max: nearest sphere" in capsys.readouterr().err
+    assert main(["solve", str(scene)]) == 0
+    assert "free space between walls and grains" in capsys.readouterr().err
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    assert [name for name, wall in summary["packing"]["walls"].items() if wall["free_space"]] == ["z_max"]
+    assert 0.3 < summary["interior"]["porosity"] < 0.4 < summary["packing"]["porosity"]
+    for box in ('box = "bed"', 'box = "fit"'):
+        scene.write_text(text.format(box))
+        assert main(["solve", str(scene), "--force"]) == 0
+        assert capsys.readouterr().err == ""
+    scene.write_text(text.format('box = "tight"'))
+    assert main(["check", str(scene)]) == 2
+    assert "unknown box 'tight'" in capsys.readouterr().err

@@ -120,7 +120,7 @@ def scene(tmp_path):
 
     def written(n):
         centres = np.random.default_rng(0).uniform(0.1, 0.9, (n, 3))
-        Packing(centres, np.full(n, 1e-6), Box([0] * 3, [1] * 3)).write(tmp_path / "grains.csv")
+        Packing(centres, np.full(n, 1e-6), Box([0.0999] * 3, [0.9001] * 3)).write(tmp_path / "grains.csv")
         text = 'packing = "grains.csv"\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }\n'
         (tmp_path / "scene.toml").write_text(text)
         return tmp_path / "scene.toml"

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from porefv.cli.packing_text import is_packing_file, packing_text
 from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 
 if TYPE_CHECKING:
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("check", help="validate a scene and its packing without computing")
-    parser.add_argument("scene", metavar="SCENE.toml", type=Path)
+    parser = commands.add_parser("check", help="validate a scene and its packing, or a packing file, without computing")
+    parser.add_argument("scene", metavar="SCENE.toml", type=Path, help="scene, or packing file")
     parser.set_defaults(command=run)
 
 
@@ -28,6 +29,14 @@ def run(options: argparse.Namespace) -> None:
 
     progress = Progress()
     announce_compilation(progress)
+    if is_packing_file(options.scene):
+        from porefv.packing.packing import Packing
+
+        packing = Packing.read(options.scene)
+        if packing.box is not None:
+            packing.validate()
+        say(f"{packing_text(packing, options.scene)}\nno errors")
+        return
     keys = SceneSource.read(options.scene).data
     if "stages" in keys:
         from porefv.cli import simulate

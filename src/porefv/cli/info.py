@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from porefv.cli.packing_text import hidden_row, is_packing_file, packing_text
 from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 from porefv.errors import InputError
 
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("info", help="print a summary of results")
-    parser.add_argument("results", metavar="RESULTS", type=Path)
+    parser = commands.add_parser("info", help="print a summary of results, or of a packing file")
+    parser.add_argument("results", metavar="RESULTS", type=Path, help="results directory, or packing file")
     parser.set_defaults(command=run)
 
 
@@ -33,6 +34,12 @@ def run(options: argparse.Namespace) -> None:
         record = read_record(options.results)
         check_series(record, options.results)
         say(outcome_text(record, options.results))
+    elif is_packing_file(options.results):
+        from porefv.packing.packing import Packing
+
+        packing = Packing.read(options.results)
+        text = packing_text(packing, options.results)
+        say(text if packing.box is None else f"{text}\n{hidden_row(packing)}")
     else:
         say(summary_text(read(options.results)))
 

@@ -6,13 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from porefv.cli.packing_text import is_packing_file
 from porefv.errors import InputError
 
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("plot", help="draw results: grains and pores of solve, time series of simulate")
-    parser.add_argument("results", metavar="RESULTS", type=Path)
+    parser = commands.add_parser(
+        "plot", help="draw results: grains and pores of solve, time series of simulate; or a packing file"
+    )
+    parser.add_argument("results", metavar="RESULTS", type=Path, help="results directory, or packing file")
     parser.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
     parser.add_argument(
         "--what", choices=("profile", "pore_sizes", "constriction_sizes"),
@@ -27,7 +30,14 @@ def run(options: argparse.Namespace) -> None:
     from porefv.system.progress import Progress
 
     with Progress().stage("drawing"):
-        if is_simulation(options.results):
+        if is_packing_file(options.results):
+            if options.what:
+                raise InputError(f"{options.results} is a packing file; --what is for results of porefv solve")
+            from porefv.packing.packing import Packing
+            from porefv.results.drawing import draw_packing
+
+            draw_packing(Packing.read(options.results), options.results.stem, options.out)
+        elif is_simulation(options.results):
             if options.what:
                 raise InputError(f"{options.results} holds a simulation; --what is for results of porefv solve")
             from porefv.simulation.series_picture import draw_series

@@ -57,6 +57,7 @@ def picture(
     pores: pyvista.UnstructuredGrid,
     *,
     walls: Walls | None = None,
+    upright: int = 1,
     title: str = "",
     size: tuple[int, int] = SIZE,
 ) -> pyvista.Plotter:
@@ -70,6 +71,8 @@ def picture(
         The mesh, with or without the cell data `pressure` [Pa].
     walls : Walls, optional
         Say which way the flow goes, for an arrow.
+    upright : int
+        Axis that is upright where there is no axis of flow.
     title : str
     size : (int, int)
         Width and height of the picture, in pixels.
@@ -89,7 +92,7 @@ def picture(
     pv = load_pyvista()
     plotter = pv.Plotter(off_screen=True, window_size=size)
     plotter.set_background("white")
-    axis = 1 if walls is None or walls.axis is None else walls.axis
+    axis = upright if walls is None or walls.axis is None else walls.axis
     view = _View(np.asarray(pores.bounds, float).reshape(3, 2), axis)
     _add_spheres(pv, plotter, spheres, view, opened="pressure" in pores.cell_data)
     if "pressure" in pores.cell_data:

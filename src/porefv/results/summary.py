@@ -159,7 +159,8 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
         found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
-        found["interior"] = None if flow.interior is None else _finite(asdict(flow.interior))
+        if any(layer.free for layer in wall_layers(flow.mesh.packing)):  # the box is not the sample
+            found["interior"] = None if flow.interior is None else _finite(asdict(flow.interior))
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity
     if "forces" in quantities:
         forces = flow.forces

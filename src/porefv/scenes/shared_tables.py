@@ -115,8 +115,9 @@ class PackingFile(Table):
                 ", ".join(repr(float(f"{c:.12g}")) for c in corner) for corner in (around.lower, around.upper)
             )
             raise InputError(
-                f"{scene or 'scene'}: {self.file} holds no box; give one in the scene, such as that of the spheres:\n"
-                f'[box]\nlower = [{lower}]\nupper = [{upper}]\nor place its walls at the outermost spheres: box = "fit"'
+                f"{scene or 'scene'}: {self.file} holds no box; place its walls at the outermost spheres with "
+                f'box = "fit", or give one in the scene, such as that of the spheres:\n'
+                f"[box]\nlower = [{lower}]\nupper = [{upper}]"
             )
         return packing
 
