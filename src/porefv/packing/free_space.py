@@ -5,12 +5,13 @@ Fluid passes along such a wall as in no packing, and permeabilities come out man
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
-from porefv.errors import InputError
-from porefv.packing.box import WALL_AXES, WALLS, Box
+from porefv.errors import FreeSpaceWarning, InputError
+from porefv.packing.box import WALLS, Box
 from porefv.packing.layers import layer_porosities
 from porefv.packing.packing import Packing
 
@@ -67,16 +68,23 @@ def wall_layers(packing: Packing) -> tuple[WallLayer, ...]:
     gaps = (box.wall_distances(packing.centres) - packing.radii[:, None]).min(axis=0)
     usual = _half_distance(packing) if (gaps > _GAP * radius).any() else 0.0
     layers = []
-    for wall, name in enumerate(WALLS):
-        axis, first = WALL_AXES[wall], wall % 2 == 0
-        porosity = inside = np.nan
+    for axis in range(3):
+        porosities = np.full(3, np.nan)
         if box.size[axis] >= 8.0 * radius:
             lower, upper = box.lower[axis], box.upper[axis]
-            of_layers = layer_porosities(packing, axis, [lower, lower + 2.0 * radius, upper - 2.0 * radius, upper])
-            porosity, inside = float(of_layers[0 if first else 2]), float(of_layers[1])
-        free = bool(gaps[wall] > _GAP * radius + usual or porosity > inside + _MORE)
-        layers.append(WallLayer(name, float(gaps[wall]), porosity, inside, free))
+            porosities = layer_porosities(packing, axis, [lower, lower + 2.0 * radius, upper - 2.0 * radius, upper])
+        inside = float(porosities[1])
+        for wall, porosity in ((2 * axis, float(porosities[0])), (2 * axis + 1, float(porosities[2]))):
+            free = bool(gaps[wall] > _GAP * radius + usual or porosity > inside + _MORE)
+            layers.append(WallLayer(WALLS[wall], float(gaps[wall]), porosity, inside, free))
     return tuple(layers)
+
+
+def warn_of_free_space(layers: tuple[WallLayer, ...], packing: Packing) -> None:
+    """Warn (`FreeSpaceWarning`) of walls of a packing that have free space."""
+    said = free_space(layers, float(packing.radii.mean()))
+    if said is not None:
+        warnings.warn(said, FreeSpaceWarning, stacklevel=2)
 
 
 def free_space(layers: tuple[WallLayer, ...], radius: float) -> str | None:

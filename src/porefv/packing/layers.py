@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError
 from porefv.packing.box import WALL_NORMALS, Box, Floats
+from porefv.packing.overlaps import cap_volume
 from porefv.packing.packing import Packing
 from porefv.system.number_checks import is_finite_number
 
@@ -72,28 +73,42 @@ def layer_porosities(packing: Packing, axis: int, edges: ArrayLike) -> Floats:
             f"not {edges[0]:.6g} to {edges[-1]:.6g}"
         )
     # What is counted beyond the outer walls, balls and their caps alike, cancels in the first and the last layer.
-    below = np.array([0.0, *(_solid_below(packing, axis, place) for place in [*edges[1:-1], np.inf])])
-    below *= packing.solid_volume / below[-1]
+    inner = [_solid_below(packing, axis, place) for place in edges[1:-1]]
+    if packing.triple_overlaps:
+        whole = _solid_below(packing, axis, np.inf)
+        inner = [part * packing.solid_volume / whole for part in inner]
+    below = [0.0, *inner, packing.solid_volume]
     return 1.0 - np.diff(below) / (np.diff(edges) * box.section(axis))
 
 
 def _solid_below(packing: Packing, axis: int, place: float) -> float:
-    """Solid volume below a plane, m³."""
+    """Solid volume below a plane by sums over pairs, m³."""
     centres, radii, found = packing.centres, packing.radii, packing.overlaps
     heights = place - centres[:, axis]
     total = _segments(radii, heights).sum()
     i, j = found.pairs.T
-    branch = centres[j] - centres[i]
-    distance = np.linalg.norm(branch, axis=1)
-    normal = branch / np.maximum(distance, _TINY)[:, None]
+    distance = np.maximum(radii[i] + radii[j] - found.depths, _TINY)
     # The plane in which two spheres meet, at this distance from each centre, cuts their lens in two caps.
-    to_plane = 0.5 * (distance + (radii[i] - radii[j]) * (radii[i] + radii[j]) / np.maximum(distance, _TINY))
-    total -= _cap_below(radii[i], normal, to_plane, axis, heights[i]).sum()
-    total -= _cap_below(radii[j], -normal, distance - to_plane, axis, heights[j]).sum()
-    spheres, walls = found.wall_spheres, found.wall_ids
-    crossing = radii[spheres] - found.wall_depths
-    total -= _cap_below(radii[spheres], WALL_NORMALS[walls], crossing, axis, heights[spheres]).sum()
-    return float(total)
+    to_plane = 0.5 * (distance + (radii[i] - radii[j]) * (radii[i] + radii[j]) / distance)
+    for spheres, others, depth in ((i, j, to_plane), (j, i, distance - to_plane)):
+        cut, whole = _cut_and_whole(radii[spheres], depth, heights[spheres])
+        normals = centres[others[cut]] - centres[spheres[cut]]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), _TINY)[:, None]
+        parts = _cap_below(radii[spheres[cut]], normals, depth[cut], axis, heights[spheres[cut]])
+        total -= whole + parts.sum()
+    spheres = found.wall_spheres
+    depth = radii[spheres] - found.wall_depths
+    cut, whole = _cut_and_whole(radii[spheres], depth, heights[spheres])
+    normals = WALL_NORMALS[found.wall_ids[cut]]
+    parts = _cap_below(radii[spheres[cut]], normals, depth[cut], axis, heights[spheres[cut]])
+    return float(total - whole - parts.sum())
+
+
+def _cut_and_whole(r: Floats, d: Floats, height: Floats) -> tuple[NDArray[np.int64], float]:
+    """Which caps belong to balls that a plane at a height over the centres cuts; volume of those below it, m³."""
+    below = height >= r
+    clipped = np.clip(d[below], -r[below], r[below])
+    return np.flatnonzero(np.abs(height) < r), float(cap_volume(r[below], r[below] - clipped).sum())
 
 
 def _segments(radii: Floats, heights: Floats) -> Floats:

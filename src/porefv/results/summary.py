@@ -19,7 +19,7 @@ from porefv.errors import ComputationError, printable
 from porefv.flow.regions import region_text
 from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
-from porefv.packing.free_space import WallLayer, wall_layers
+from porefv.packing.free_space import WallLayer
 from porefv.results.force_table import FORCE_FILES
 from porefv.system.version import __version__
 
@@ -32,7 +32,7 @@ UNITS = {
     "permeability": "m2", "permeabilities": "m2",
     "hydraulic_conductivity": "m/s", "inflow": "m3/s", "outflow": "m3/s",
     "wall_flux": "m3/s", "wall_pressure": "Pa",
-    "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "viscosity": "Pa s",
+    "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "gap": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
     "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1",
     "profile": "1",
@@ -47,6 +47,7 @@ def summary_json(
     vtk: bool,
     table_format: str,
     seconds: Mapping[str, float],
+    layers: Sequence[WallLayer],
     sample: Mapping[str, Any],
     permeabilities: DirectionalPermeabilities | None = None,
     scene: str | None = None,
@@ -63,6 +64,8 @@ def summary_json(
         What was asked for.
     seconds : mapping of str to float
         Wall time of each stage.
+    layers : sequence of WallLayer
+        Along the walls.
     sample : mapping
         What `quantity_summaries` returns.
     permeabilities : DirectionalPermeabilities, optional
@@ -73,11 +76,12 @@ def summary_json(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene": scene and printable(scene),
         "quantities": list(quantities),
-        "packing": {"file": packing and printable(packing), **_packing(mesh)},
+        "packing": {"file": packing and printable(packing), **_packing(mesh, layers)},
         "mesh": _mesh(mesh),
         **({} if flow is None else _flow(flow, quantities, table_format)),
         **({} if permeabilities is None else {"permeabilities": vars(permeabilities)}),
         **sample,
+        **_interior(flow, quantities, layers),
         "seconds": {**seconds, "total": sum(seconds.values())},
         "versions": _versions(["vtk"] * vtk + ["pyarrow"] * (table_format == "parquet")),
         "units": UNITS,
@@ -90,11 +94,20 @@ def summary_json(
     return re.sub(r"\[\n\s+([^][{}]*?)\n\s+\]", _on_one_line, text) + "\n"
 
 
+def _interior(
+    flow: PoreFlow | None, quantities: Collection[str], layers: Sequence[WallLayer]
+) -> dict[str, dict[str, Any] | None]:
+    """Porosity and permeability of the inside, where the box has free space: the box is not the sample then."""
+    if flow is None or "permeability" not in quantities or not any(layer.free for layer in layers):
+        return {}
+    return {"interior": None if flow.interior is None else _finite(asdict(flow.interior))}
+
+
 def _on_one_line(found: re.Match[str]) -> str:
     return "[" + re.sub(r",\n\s+", ", ", found[1]) + "]"
 
 
-def _packing(mesh: PoreMesh) -> dict[str, Any]:
+def _packing(mesh: PoreMesh, layers: Sequence[WallLayer]) -> dict[str, Any]:
     packing = mesh.packing
     return {
         "spheres": len(packing),
@@ -104,7 +117,7 @@ def _packing(mesh: PoreMesh) -> dict[str, Any]:
         "radii": [packing.radii.min(), packing.radii.max()],
         "box": {"lower": mesh.box.lower, "upper": mesh.box.upper},
         "porosity": packing.porosity,
-        "walls": {layer.wall: _wall_layer(layer) for layer in wall_layers(packing)},
+        "walls": {layer.wall: _wall_layer(layer) for layer in layers},
         "pore_volume": packing.porosity * mesh.box.volume,
         "reading": None if packing.reading is None else packing.reading.as_data(),
     }
@@ -159,8 +172,6 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
         found["reliability"] = described(flow.reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
-        if any(layer.free for layer in wall_layers(flow.mesh.packing)):  # the box is not the sample
-            found["interior"] = None if flow.interior is None else _finite(asdict(flow.interior))
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity
     if "forces" in quantities:
         forces = flow.forces

@@ -32,6 +32,7 @@ from porefv.flow.directional_permeabilities import (
 )
 from porefv.flow.pore_flow import PoreFlow
 from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.free_space import wall_layers, warn_of_free_space
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
 from porefv.results.quantity_tables import (
     SAMPLE_QUANTITIES,
@@ -221,9 +222,11 @@ def save(
             _write_vtk(folder, mesh, flow, quantities)
     if flow is not None and flow.conductance.name == SectionFriction.name and (said := flow.reliability.warning):
         warnings.warn(said, OutOfRangeWarning, stacklevel=2)
+    layers = wall_layers(mesh.packing)
+    warn_of_free_space(layers, mesh.packing)
     text = summary_json(
         mesh, flow, quantities=quantities, vtk=vtk, table_format=table_format, seconds=progress.seconds,
-        sample=sample, permeabilities=along_axes, scene=scene, packing=packing,
+        layers=layers, sample=sample, permeabilities=along_axes, scene=scene, packing=packing,
     )  # fmt: skip
     (folder / "summary.json").write_text(text, encoding="utf-8")
 

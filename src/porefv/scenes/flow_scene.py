@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
@@ -10,7 +9,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from porefv.conductance.model import ConductanceModel
-from porefv.errors import FreeSpaceWarning, InputError
+from porefv.errors import InputError
 from porefv.flow.directional_permeabilities import (
     DirectionalPermeabilities,
     directional_permeabilities,
@@ -22,7 +21,7 @@ from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS, Box
-from porefv.packing.free_space import free_space, wall_layers
+from porefv.packing.free_space import wall_layers, warn_of_free_space
 from porefv.packing.packing import Packing
 from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
@@ -320,7 +319,6 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
-                _warn_of_free_space(packing)
             output.sections.check(output.quantities, self.walls, mesh.box)
             flow = self.pore_flow(mesh) if self.driven else None
             save(
@@ -345,14 +343,8 @@ class FlowScene(Scene):
         """
         check_target(self.output.directory, vtk=self.output.vtk, table_format=self.output.table_format)
         mesh = self.pore_mesh()
-        _warn_of_free_space(mesh.packing)
+        warn_of_free_space(wall_layers(mesh.packing), mesh.packing)
         if self.driven:
             self.pore_flow(mesh)
         self.output.sections.check(self.output.quantities, self.walls, mesh.box)
         return mesh.packing
-
-
-def _warn_of_free_space(packing: Packing) -> None:
-    said = free_space(wall_layers(packing), float(packing.radii.mean()))
-    if said is not None:
-        warnings.warn(said, FreeSpaceWarning, stacklevel=2)
