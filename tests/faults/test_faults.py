@@ -179,6 +179,31 @@ def test_pack(survives, made, force):
     survives(arguments, prepare, check, errno.ENOSPC)
 
 
+@pytest.mark.parametrize(("to", "name"), [("csv", "tables"), ("openpnm", "net.npz"), ("vtu", "mesh.vtu")])
+def test_export(survives, old, new, to, name):
+    arguments = ["export", "results", "--to", to, "--out", name, "--force"]
+    earlier = {}
+
+    def written(folder):
+        return {path: content for path, content in contents(folder).items() if path.startswith(name)}
+
+    def prepare(folder):
+        put(old, folder, "results")
+        assert main(arguments) == 0
+        earlier.update(written(folder))
+        shutil.rmtree(folder / "results")
+        put(new, folder, "results")
+
+    def check(folder):
+        before = written(folder)
+        assert main(arguments) == 0
+        later = written(folder)
+        assert all(before[path] in (earlier[path], later[path]) for path in later)
+        assert earlier.keys() == later.keys() and sorted(os.listdir(folder)) == sorted(["results", name])
+
+    survives(arguments, prepare, check)
+
+
 @pytest.fixture(scope="module")
 def resolved(data_packing):
     return StokesReference.read(next((Path(data_packing).parents[1] / "reference" / "stokes").glob("nine*")))

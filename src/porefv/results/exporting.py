@@ -5,7 +5,9 @@ Everything is taken from the results directory, which must have VTK files.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,7 @@ from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS
 from porefv.results.csv_table import write_csv
 from porefv.results.reading import Results
-from porefv.system.atomic_files import atomic_write, locked
+from porefv.system.atomic_files import atomic_write, finished_name, locked
 
 # meshio's name of the format for each extension: formats that are one file and have all cells.
 MESH_FORMATS = {
@@ -63,17 +65,21 @@ def export(results: Results, path: str | PathLike[str], to: str, *, force: bool 
     """
     path = Path(path)
     writers = _writers(results, path, to)
-    existing = [target for target in writers if target.exists()]
-    if existing and not force:
-        raise InputError(f"{existing[0]} exists. Choose another place, or replace it with {FORCE_OPTION}")
-    if to == "csv":
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror}.") from None
-    for target, write in writers.items():
-        with locked(target), atomic_write(target) as temporary:
-            write(temporary)
+    with locked(path):
+        existing = [target for target in writers if os.path.lexists(target)]
+        if existing and not force:
+            raise InputError(f"{existing[0]} exists. Choose another place, or replace it with {FORCE_OPTION}")
+        if to == "csv":
+            try:
+                path.mkdir(parents=True, exist_ok=True)
+                for name in os.listdir(path):  # what a process that was killed has left
+                    if (finished := finished_name(name)) is not None and path / finished in writers:
+                        (path / name).unlink()
+            except OSError as error:
+                raise InputError(f"cannot write {path}: {error.strerror}.") from None
+        with ExitStack() as stack:  # all are complete before the first is in its place
+            for target, write in writers.items():
+                write(stack.enter_context(atomic_write(target)))
     return list(writers)
 
 
