@@ -21,6 +21,11 @@ OPERATIONS = {
 }  # fmt: skip
 
 
+def pytest_collection_modifyitems(items):
+    """These tests first: copies of the process are made quickly while it is small."""
+    items.sort(key=lambda item: "faults" not in item.path.parts)
+
+
 @dataclass
 class Outcome:
     """How a command ended in a process of its own, and what it said."""
