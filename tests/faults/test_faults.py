@@ -55,9 +55,7 @@ name = "wet"
 duration = 2.0e-4
 [output]
 every = 1.0e-4
-profiles = 4.0e-4
 frames = [3.0e-4]
-table_format = "npy"
 [checkpoint]
 steps = 4
 """

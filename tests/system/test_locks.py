@@ -1,7 +1,6 @@
 """One process at a time writes results; locks of processes that are gone are taken over."""
 
 import json
-import multiprocessing
 import os
 import shutil
 import signal
@@ -83,30 +82,26 @@ def test_threads_exclude_each_other_and_wait_for_nobody(tmp_path):
     assert len(refused) == 1
 
 
-def take(place, found):
-    """Take a lock ten times, however often it is refused; fail if anybody else has it meanwhile."""
-    taken = 0
-    while taken < 10:
-        try:
-            with locked(place / "results"):
-                (place / "mine").mkdir()
-                (place / "mine").rmdir()
-                taken += 1
-        except InputError:
-            time.sleep(0.001)
-    found.put(taken)
+# Take the lock ten times, however often it is refused; fail if anybody else has it meanwhile.
+TAKE = """
+import pathlib, sys, time
+from porefv.errors import InputError
+from porefv.system.atomic_files import locked
+place, taken = pathlib.Path(sys.argv[1]), 0
+while taken < 10:
+    try:
+        with locked(place / "results"):
+            (place / "mine").mkdir()
+            (place / "mine").rmdir()
+            taken += 1
+    except InputError:
+        time.sleep(0.001)
+"""
 
 
 def test_of_many_processes_one_at_a_time_holds_it(tmp_path):
-    context = multiprocessing.get_context("spawn")
-    found = context.Queue()
-    processes = [context.Process(target=take, args=(tmp_path, found)) for _ in range(4)]
-    for process in processes:
-        process.start()
-    assert [found.get(timeout=120) for _ in processes] == [10] * 4
-    for process in processes:
-        process.join()
-    assert [process.exitcode for process in processes] == [0] * 4
+    processes = [subprocess.Popen([sys.executable, "-c", TAKE, tmp_path]) for _ in range(4)]
+    assert [process.wait(timeout=120) for process in processes] == [0] * 4
     assert list(tmp_path.iterdir()) == []
 
 
