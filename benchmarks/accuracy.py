@@ -30,6 +30,7 @@ from porefv.conductance.section_friction.model import SectionFriction
 from porefv.conductance.section_friction.pore_centres import centres_of_pores
 from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces
+from porefv.flow.interior import of_cells
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
@@ -507,13 +508,8 @@ def inside(flow: PoreFlow) -> tuple[float, float]:
     mesh = flow.mesh
     places = (mesh.vertices - mesh.box.lower) / mesh.box.size
     chosen = ((places > 0.2) & (places < 0.8)).all(axis=1)
-    volumes, voids = mesh.cell_volumes[chosen], mesh.cell_void_volumes[chosen]
-    pores = mesh.cell_pore[chosen]
-    flux = voids @ flow.pore_velocity[pores, 1] / volumes.sum()
-    weight = np.sqrt(volumes)[:, None]
-    linear = np.column_stack([mesh.vertices[chosen], np.ones(len(pores))])
-    gradient = np.linalg.lstsq(weight * linear, weight[:, 0] * flow.pressure[pores], rcond=None)[0][1]
-    return float(voids.sum() / volumes.sum()), float(-flux / gradient)
+    found = of_cells(mesh, chosen, flow.pressure, flow.pore_velocity, 1, flow.fluid.viscosity)
+    return found.porosity, found.permeability
 
 
 # ---- fit --------------------------------------------------------------------------------------------------------

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,27 +30,26 @@ def say(text: str) -> None:
     if sys.stdout is None:
         raise _no_output("it is closed")
     encoding = sys.stdout.encoding or "utf-8"
-    try:
-        print(printable(text).encode(encoding, "backslashreplace").decode(encoding))
-    except OSError as error:
-        _drop_output()
-        raise error if isinstance(error, BrokenPipeError) else _no_output(error.strerror) from None
-    flush()
+    with _errors_of_output():
+        print(printable(text).encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 def flush() -> None:
     """Write what is still to be written on standard output; errors as `say`."""
-    try:
-        if sys.stdout is not None:
+    if sys.stdout is not None:
+        with _errors_of_output():
             sys.stdout.flush()
+
+
+@contextmanager
+def _errors_of_output() -> Iterator[None]:
+    """Turn errors of standard output into those of `say`."""
+    try:
+        yield
     except OSError as error:
-        _drop_output()
+        # What is still to be written goes nowhere, so that it is not tried again when the process ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise error if isinstance(error, BrokenPipeError) else _no_output(error.strerror) from None
-
-
-def _drop_output() -> None:
-    """What is still to be written goes nowhere, so that it is not tried again when the process ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _no_output(reason: str | None) -> PorefvError:

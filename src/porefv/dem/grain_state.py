@@ -14,6 +14,7 @@ import numpy as np
 
 from porefv.dem.state_files import ArrayOf
 from porefv.packing.packing import Packing
+from porefv.system.number_checks import must
 from porefv.tessellation.ordering import morton_codes
 
 
@@ -223,18 +224,18 @@ class GrainState:
         """
         n, motion, pairs, members = len(self), self.grains.motion, self.pairs, self.wall_pairs.members
         everyone = np.arange(n)
-        _must(n > 0, "there are no grains")
-        _must(np.array_equal(np.sort(self.order), everyone), "order is no numbering of the grains")
-        _must(np.array_equal(self.rank[self.order], everyone), "rank is not the inverse of order")
+        must(n > 0, "there are no grains")
+        must(np.array_equal(np.sort(self.order), everyone), "order is no numbering of the grains")
+        must(np.array_equal(self.rank[self.order], everyone), "rank is not the inverse of order")
         i, j = pairs.grains.T.astype(np.int64)
-        _must(bool(((i >= 0) & (i < j) & (j < n)).all()), "pairs_grains are not pairs of two grains")
-        _must(bool((np.diff(i * n + j) > 0).all()), "pairs_grains are not sorted")
-        _must(np.array_equal(pairs.starts, np.searchsorted(i, np.arange(n + 1))), "pairs_starts are not those of pairs")
-        _must(np.array_equal(pairs.others, j), "pairs_others are not those of pairs")
+        must(bool(((i >= 0) & (i < j) & (j < n)).all()), "pairs_grains are not pairs of two grains")
+        must(bool((np.diff(i * n + j) > 0).all()), "pairs_grains are not sorted")
+        must(np.array_equal(pairs.starts, np.searchsorted(i, np.arange(n + 1))), "pairs_starts are not those of pairs")
+        must(np.array_equal(pairs.others, j), "pairs_others are not those of pairs")
         grain, wall = members.T.astype(np.int64)
         inside = (grain >= 0) & (grain < n) & (wall >= 0) & (wall < 6)
-        _must(bool(inside.all()), "wall_pairs_members are not pairs of a grain and a wall")
-        _must(bool((np.diff(grain * 6 + wall) > 0).all()), "wall_pairs_members are not sorted")
+        must(bool(inside.all()), "wall_pairs_members are not pairs of a grain and a wall")
+        must(bool((np.diff(grain * 6 + wall) > 0).all()), "wall_pairs_members are not sorted")
         for name, numbers in (
             ("grains_motion", motion), ("grains_inverse_mass", self.grains.inverse_mass),
             ("grains_inverse_inertia", self.grains.inverse_inertia), ("applied", self.applied),
@@ -247,13 +248,8 @@ class GrainState:
             ("listing_slack", self.listing.slack), ("work", self.work), ("applied_work", self.applied_work),
             ("time", self.time),
         ):  # fmt: skip
-            _must(bool(np.isfinite(numbers).all()), f"{name} is not finite")
-        _must(bool((motion[:, 3] > 0.0).all()), "grains_motion has a radius that is not positive")
-        _must(bool((self.walls.places[::2] < self.walls.places[1::2]).all()), "walls_places make no box")
-        _must(0.0 <= self.listing.slack <= motion[:, 3].min(), "listing_slack is not within a radius")
-        _must(self.steps >= 0, "steps are negative")
-
-
-def _must(holds: bool, otherwise: str) -> None:
-    if not holds:
-        raise ValueError(otherwise)
+            must(bool(np.isfinite(numbers).all()), f"{name} is not finite")
+        must(bool((motion[:, 3] > 0.0).all()), "grains_motion has a radius that is not positive")
+        must(bool((self.walls.places[::2] < self.walls.places[1::2]).all()), "walls_places make no box")
+        must(0.0 <= self.listing.slack <= motion[:, 3].min(), "listing_slack is not within a radius")
+        must(self.steps >= 0, "steps are negative")

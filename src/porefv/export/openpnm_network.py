@@ -10,6 +10,7 @@ from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
+from porefv.solvers.pressure_equation import reached
 
 
 def mesh_to_openpnm(mesh: PoreMesh) -> dict[str, np.ndarray]:
@@ -104,7 +105,8 @@ def openpnm_network(
         network["throat.flux"] = _sums(sense * throat_data["flux"], throat)
     if walls is not None:
         network["pore.imposed_pressure"] = _imposed(bits, walls)
-        network["pore.isolated"] = _isolated(network)
+        held = ~np.isnan(network["pore.imposed_pressure"])
+        network["pore.isolated"] = ~reached(conns.astype(np.int32), network["throat.hydraulic_conductance"], held)
     return network
 
 
@@ -118,16 +120,3 @@ def _imposed(bits: np.ndarray, walls: Walls) -> np.ndarray:
     touches = (bits[:, None] >> held) & 1
     count = touches.sum(axis=1)
     return np.divide(touches @ walls.pressures[held], count, out=np.full(len(bits), np.nan), where=count > 0)
-
-
-def _isolated(network: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(n,) bool: pores from which no throat that conducts leads to a pore of imposed pressure."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n, conducts = len(network["pore.all"]), network["throat.hydraulic_conductance"] > 0.0
-    i, j = network["throat.conns"][conducts].T
-    count, cluster = connected_components(coo_array((np.ones(len(i)), (i, j)), (n, n)), directed=False)
-    reached = np.zeros(count, bool)
-    reached[cluster[~np.isnan(network["pore.imposed_pressure"])]] = True
-    return ~reached[cluster]

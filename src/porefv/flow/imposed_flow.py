@@ -153,7 +153,8 @@ def _refuse_walls_without_outlet(
     pairs = np.concatenate([mesh.throats.pores, joined.astype(mesh.throats.pores.dtype)])
     weights = np.concatenate([conductances, np.ones(len(joined))])
     held = np.concatenate([~np.isnan(held_pressures(mesh, known, inside)), np.zeros(6, bool)])
-    closed = [WALLS[wall] for wall in unknown if not reached(pairs, weights, held)[n + wall]]
+    has_outlet = reached(pairs, weights, held)
+    closed = [WALLS[wall] for wall in unknown if not has_outlet[n + wall]]
     if closed:
         raise ComputationError(
             f"no open path leads from {closed[0]}, which has an imposed flow, to an imposed pressure: no flow can pass"

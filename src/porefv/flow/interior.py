@@ -53,9 +53,16 @@ def interior(
     away = _AWAY * 2.0 * float(mesh.packing.radii.mean())
     lower, upper = np.maximum(around.lower, box.lower) + away, np.minimum(around.upper, box.upper) - away
     chosen = ((mesh.vertices > lower) & (mesh.vertices < upper)).all(axis=1)
-    cells = int(np.count_nonzero(chosen))
-    if cells < _LEAST:
+    if np.count_nonzero(chosen) < _LEAST:
         return None
+    return of_cells(mesh, chosen, pressure, velocity, axis, viscosity)
+
+
+def of_cells(
+    mesh: PoreMesh, chosen: np.ndarray, pressure: np.ndarray, velocity: np.ndarray, axis: int, viscosity: float
+) -> Interior:
+    """Porosity and permeability of some cells, `chosen` (m,) bool; other arguments as of `interior`."""
+    cells = int(np.count_nonzero(chosen))
     volumes, voids, pores = mesh.cell_volumes[chosen], mesh.cell_void_volumes[chosen], mesh.cell_pore[chosen]
     flux = voids @ velocity[pores, axis] / volumes.sum()
     # The plane that fits the pressures of the cells best, by volume.

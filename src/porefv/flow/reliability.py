@@ -6,7 +6,7 @@ clouds, and voids full of fines. A throat can be outside that range in four ways
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,11 +100,6 @@ def reliability(mesh: PoreMesh, conductances: np.ndarray, flux: np.ndarray, slip
     bits = np.arange(16)
     overlap, cut, openness, ratio = (float(by_kinds[bits & bit > 0].sum()) for bit in (_OVERLAP, _CUT, _OPEN, _RATIO))
     return Reliability(overlap, cut, openness, ratio, outside=float(by_kinds[1:].sum()))
-
-
-def described(found: Reliability) -> dict[str, float]:
-    """The parts by name, for summary.json."""
-    return {field.name: getattr(found, field.name) for field in fields(found)}
 
 
 @kernel(error_model="numpy")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.errors import FreeSpaceWarning, InputError
-from porefv.packing.box import WALLS, Box
+from porefv.packing.box import WALLS, Box, Floats
 from porefv.packing.layers import layer_porosities
 from porefv.packing.packing import Packing
 
@@ -65,7 +65,7 @@ def wall_layers(packing: Packing) -> tuple[WallLayer, ...]:
     if box is None:
         raise InputError("the packing has no box, and gaps are those to its walls")
     radius = float(packing.radii.mean())
-    gaps = (box.wall_distances(packing.centres) - packing.radii[:, None]).min(axis=0)
+    gaps = _gaps(packing, box)
     usual = _half_distance(packing) if (gaps > _GAP * radius).any() else 0.0
     layers = []
     for axis in range(3):
@@ -136,9 +136,13 @@ def fitted(packing: Packing, how: str) -> Packing:
         return packing.with_box(around)
     if packing.box is None:
         raise InputError('the packing has no box of which walls could be moved: give box = "fit"')
-    gaps = (packing.box.wall_distances(packing.centres) - packing.radii[:, None]).min(axis=0)
-    far = gaps > _FREE * packing.radii.mean()
+    far = _gaps(packing, packing.box) > _FREE * packing.radii.mean()
     return packing.with_box(Box.between(np.where(far, around.wall_places, packing.box.wall_places)))
+
+
+def _gaps(packing: Packing, box: Box) -> Floats:
+    """(6,): distance of each wall from the nearest sphere, negative where that reaches beyond it, m."""
+    return (box.wall_distances(packing.centres) - packing.radii[:, None]).min(axis=0)
 
 
 def _half_distance(packing: Packing) -> float:

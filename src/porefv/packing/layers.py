@@ -85,7 +85,7 @@ def _solid_below(packing: Packing, axis: int, place: float) -> float:
     """Solid volume below a plane by sums over pairs, m³."""
     centres, radii, found = packing.centres, packing.radii, packing.overlaps
     heights = place - centres[:, axis]
-    total = _segments(radii, heights).sum()
+    total = cap_volume(radii, np.maximum(heights + radii, 0.0)).sum()
     i, j = found.pairs.T
     distance = np.maximum(radii[i] + radii[j] - found.depths, _TINY)
     # The plane in which two spheres meet, at this distance from each centre, cuts their lens in two caps.
@@ -109,12 +109,6 @@ def _cut_and_whole(r: Floats, d: Floats, height: Floats) -> tuple[NDArray[np.int
     below = height >= r
     clipped = np.clip(d[below], -r[below], r[below])
     return np.flatnonzero(np.abs(height) < r), float(cap_volume(r[below], r[below] - clipped).sum())
-
-
-def _segments(radii: Floats, heights: Floats) -> Floats:
-    """Volume of each ball below a plane, at a height over its centre, m³."""
-    h = np.clip(heights + radii, 0.0, 2.0 * radii)
-    return np.pi * h**2 * (radii - h / 3.0)
 
 
 def _cap_below(r: Floats, normal: Floats, d: Floats, axis: int, height: Floats) -> Floats:

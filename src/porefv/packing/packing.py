@@ -182,8 +182,8 @@ class Packing:
     @property
     def bounding_box(self) -> Box:
         """The smallest box, with corners of few digits, that holds every sphere."""
-        lower = (self.centres - self.radii[:, None]).min(axis=0)
-        upper = (self.centres + self.radii[:, None]).max(axis=0)
+        around = Box.around(self)
+        lower, upper = around.lower, around.upper
         digit = 10.0 ** (np.floor(np.log10((upper - lower).max())) - 5)
         # What rounding adds to a bound does not push it to the next digit.
         return Box(np.floor(lower / digit + 1e-6) * digit, np.ceil(upper / digit - 1e-6) * digit)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from porefv.flow.walls import Walls
 from porefv.packing.box import Box
 from porefv.packing.layers import layer_edges
 from porefv.results.csv_table import read_csv, write_csv
+from porefv.system.number_checks import known
 
 # Fractions of the quantiles in the summary.
 QUANTILES = (0.1, 0.5, 0.9)
@@ -187,7 +187,7 @@ def quantity_summaries(
     for quantity in tables:
         found[quantity]["table"] = TABLES[quantity].file
     if "tortuosity" in quantities:
-        found["tortuosity"] = _known(flow.tortuosity)
+        found["tortuosity"] = known(flow.tortuosity)
     if "velocity" in quantities:
         found["velocity"] = {"darcy": flow.darcy_velocity, "interstitial": flow.interstitial_velocity}
     return found
@@ -195,9 +195,5 @@ def quantity_summaries(
 
 def _radii(found: Distribution) -> dict[str, float | None]:
     """Mean and quantiles of radii; None where there are none."""
-    quantiles = {f"r{100 * fraction:.0f}": _known(found.quantile(fraction)) for fraction in QUANTILES}
-    return {"mean": _known(found.mean), **quantiles}
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    quantiles = {f"r{100 * fraction:.0f}": known(found.quantile(fraction)) for fraction in QUANTILES}
+    return {"mean": known(found.mean), **quantiles}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import platform
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -17,15 +16,16 @@ import numpy as np
 from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import ComputationError, printable
 from porefv.flow.regions import region_text
-from porefv.flow.reliability import described
 from porefv.packing.box import WALLS
 from porefv.packing.free_space import WallLayer
 from porefv.results.force_table import FORCE_FILES
+from porefv.system.number_checks import known
 from porefv.system.version import __version__
 
 if TYPE_CHECKING:
     from porefv.flow.directional_permeabilities import DirectionalPermeabilities
     from porefv.flow.pore_flow import PoreFlow
+    from porefv.flow.reliability import Reliability
     from porefv.mesh.pore_mesh import PoreMesh
 
 UNITS = {
@@ -94,6 +94,11 @@ def summary_json(
     return re.sub(r"\[\n\s+([^][{}]*?)\n\s+\]", _on_one_line, text) + "\n"
 
 
+def tested_reliability(flow: PoreFlow) -> Reliability | None:
+    """The reliability of a flow by the model that the tested range is of; None for other models."""
+    return flow.reliability if flow.conductance.name == SectionFriction.name else None
+
+
 def _interior(
     flow: PoreFlow | None, quantities: Collection[str], layers: Sequence[WallLayer]
 ) -> dict[str, dict[str, Any] | None]:
@@ -124,8 +129,8 @@ def _packing(mesh: PoreMesh, layers: Sequence[WallLayer]) -> dict[str, Any]:
 
 
 def _wall_layer(layer: WallLayer) -> dict[str, float | bool | None]:
-    known = {"porosity": _known(layer.porosity), "inside": _known(layer.inside)}
-    return {"gap": layer.gap, **known, "free_space": layer.free}
+    porosities = {"porosity": known(layer.porosity), "inside": known(layer.inside)}
+    return {"gap": layer.gap, **porosities, "free_space": layer.free}
 
 
 def _mesh(mesh: PoreMesh) -> dict[str, Any]:
@@ -159,7 +164,7 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             "wall_pressure": flow.wall_pressure,
         },
         "unusual": _unusual(flow),
-        "solver": {name: _known(value) for name, value in vars(flow.solver_report).items()},
+        "solver": {name: known(value) for name, value in vars(flow.solver_report).items()},
     }
     if flow.sources:
         found["sources"] = [{"region": region_text(s.region), "flow": s.flow} for s in flow.sources]
@@ -168,8 +173,8 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             {"region": region_text(fixed.region), "pressure": fixed.pressure, "flow": flux}
             for fixed, flux in zip(flow.fixed_pressures, flow.fixed_pressure_flux, strict=True)
         ]
-    if flow.conductance.name == SectionFriction.name:  # what the range is of
-        found["reliability"] = described(flow.reliability)
+    if (reliability := tested_reliability(flow)) is not None:
+        found["reliability"] = asdict(reliability)
     if "permeability" in quantities:
         found["permeability"] = flow.permeability
         found["hydraulic_conductivity"] = flow.hydraulic_conductivity
@@ -219,9 +224,4 @@ def _plain(value: Any) -> Any:
 
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: _known(value) for name, value in values.items()}
-
-
-def _known(value: Any) -> Any:
-    """The value; None for a number that is not known."""
-    return None if isinstance(value, float) and math.isnan(value) else value
+    return {name: known(value) for name, value in values.items()}

@@ -21,7 +21,6 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import InputError, OutOfRangeWarning
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
@@ -43,7 +42,7 @@ from porefv.results.quantity_tables import (
     quantity_summaries,
     write_tables,
 )
-from porefv.results.summary import summary_json
+from porefv.results.summary import summary_json, tested_reliability
 from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
@@ -220,7 +219,8 @@ def save(
         write_tables(tables, folder)
         if vtk:
             _write_vtk(folder, mesh, flow, quantities)
-    if flow is not None and flow.conductance.name == SectionFriction.name and (said := flow.reliability.warning):
+    reliability = None if flow is None else tested_reliability(flow)
+    if reliability is not None and (said := reliability.warning):
         warnings.warn(said, OutOfRangeWarning, stacklevel=2)
     layers = wall_layers(mesh.packing)
     warn_of_free_space(layers, mesh.packing)

@@ -20,6 +20,7 @@ from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, RESUME_OPTION, InputError
 from porefv.simulation.series import FILES, PROFILES, SERIES, SeriesMark
 from porefv.system.atomic_files import atomic_write, check_is_no_root, finished_name, sync_directory
+from porefv.system.number_checks import must
 from porefv.system.version import __version__
 
 RECORD, FORMAT, VERSION = "simulation.json", "porefv.simulation", 2
@@ -43,7 +44,7 @@ class StageSpan:
     end: float | None = None
 
     def __post_init__(self) -> None:
-        _must(self.begin_step >= 0 and math.isfinite(self.begin), "a stage begins at no time")
+        must(self.begin_step >= 0 and math.isfinite(self.begin), "a stage begins at no time")
 
 
 @dataclass
@@ -75,10 +76,10 @@ class CheckpointRecord:
     frames: dict[int, float]
 
     def __post_init__(self) -> None:
-        _must(_CHECKPOINT.fullmatch(self.file) is not None, f"no checkpoint is called {self.file!r}")
-        _must(self.step >= 0 and math.isfinite(self.time), "the checkpoint is of no time")
-        _must(set(self.series) <= {SERIES, PROFILES}, "there is no such series")
-        _must(SERIES in self.series and all(mark.size >= 0 for mark in self.series.values()), "a series has no size")
+        must(_CHECKPOINT.fullmatch(self.file) is not None, f"no checkpoint is called {self.file!r}")
+        must(self.step >= 0 and math.isfinite(self.time), "the checkpoint is of no time")
+        must(set(self.series) <= {SERIES, PROFILES}, "there is no such series")
+        must(SERIES in self.series and all(mark.size >= 0 for mark in self.series.values()), "a series has no size")
 
 
 @dataclass
@@ -124,11 +125,11 @@ class RunRecord:
     checkpoint: CheckpointRecord | None = None
 
     def __post_init__(self) -> None:
-        _must(self.status in STATUSES, f"no run is {self.status!r}")
-        _must(len(self.box) == 3 and all(math.isfinite(size) and size > 0.0 for size in self.box), "the box is none")
-        _must(isinstance(self.scene.get("stages", []), list), "the scene has no stages")
-        _must(len(self.spans) <= len(self.scene.get("stages", [])), "more stages have begun than there are")
-        _must(self.checkpoint is None or bool(self.spans), "there is a checkpoint, and no stage has begun")
+        must(self.status in STATUSES, f"no run is {self.status!r}")
+        must(len(self.box) == 3 and all(math.isfinite(size) and size > 0.0 for size in self.box), "the box is none")
+        must(isinstance(self.scene.get("stages", []), list), "the scene has no stages")
+        must(len(self.spans) <= len(self.scene.get("stages", [])), "more stages have begun than there are")
+        must(self.checkpoint is None or bool(self.spans), "there is a checkpoint, and no stage has begun")
 
     def write(self, directory: Path) -> None:
         """Write simulation.json; the one there was is replaced when this one is complete."""
@@ -211,11 +212,6 @@ def read_record(directory: str | PathLike[str]) -> RunRecord:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is damaged ({error}). Start the run anew, with {FORCE_OPTION}") from None
-
-
-def _must(holds: bool, otherwise: str) -> None:
-    if not holds:
-        raise ValueError(otherwise)
 
 
 # ---- the directory ----------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -25,6 +26,17 @@ def is_finite_number(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         return False
     return bool(abs(value) <= sys.float_info.max)  # type: ignore[operator]  # false for nan, and for integers that are no float
+
+
+def must(holds: bool, otherwise: str) -> None:
+    """ValueError with that text unless something holds."""
+    if not holds:
+        raise ValueError(otherwise)
+
+
+def known(value: Any) -> Any:
+    """The value; None for a number that is not known (NaN)."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def check_number(value: object, name: str, what: str, holds: Callable[[float], bool]) -> None:
