@@ -1,15 +1,19 @@
 """Comparison of methods: their errors against the reference, the Pareto front, and what the command writes."""
 
 import csv
+import warnings
 
 import numpy as np
 import pytest
 
 from porefv import InputError, Packing, PoreFlow, Walls, cli
+from porefv.comparison import comparison
 from porefv.comparison.comparison import MethodComparison, compare
 from porefv.comparison.measurement import MethodResult, measure
 from porefv.comparison.methods import Method, methods
+from porefv.comparison.output import draw, table
 from porefv.conductance.registry import MODELS, conductance_model
+from porefv.errors import MissingExtraError
 
 SCENE = """
 packing = "{packing}"
@@ -56,6 +60,44 @@ def test_methods_are_all_models_and_tolerances_where_they_matter():
     large = methods(tuple(MODELS), "hydraulic-radius", True, True)
     assert large[-1].conductance is None
     assert len(large) > len(small) + 2
+
+
+def test_the_table_fits_a_terminal_and_tells_tolerances_from_models():
+    exact = np.array([[1.0, 0.0, 0.0]])
+    names = [*MODELS, "resolved Stokes flow"]
+    models = [MethodResult(Method(name, name), 1.2345678e-12, exact, 12.345, 2.0**30) for name in names]
+    loose = [
+        MethodResult(
+            Method(f"section-friction, cg to {t:.0e}", "section-friction", "cg", t), 1.0, exact * (1 + t), 1.0, 0.0
+        )
+        for t in (1e-2, 1e-10)
+    ]
+    found = MethodComparison([*models, *loose], models[0], ("why",))
+    lines = table(found).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "tolerance 1e-02" in table(found)
+    assert lines[-1] == "why"
+
+
+def test_the_picture_shows_the_reference_and_warns_of_nothing(tmp_path):
+    exact = np.array([[1.0, 0.0, 0.0]])
+    reference = MethodResult(Method("resolved Stokes flow", None), 1.0, exact, 24.0, 1e9)
+    same = MethodResult(Method("same", "same"), 1.0, exact, 1.0, float("nan"))
+    loose = MethodResult(Method("a, cg to 1e-02", "a", "cg", 1e-2), 1.0, 1.1 * exact, 1.0, 0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw(MethodComparison([same, loose, reference], reference), tmp_path / "trade.png")
+    assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_missing_extra_is_told_in_a_line(scene, monkeypatch):
+    def missing():
+        raise MissingExtraError("ngsolve", "The resolved flow")
+
+    monkeypatch.setattr(comparison, "require_ngsolve", missing)
+    assert compare(scene).remarks == ('The resolved flow needs an extra: pip install "porefv[reference]"',)
+    with pytest.raises(MissingExtraError):
+        compare(scene, resolved=True)
 
 
 def test_a_method_is_the_flow_of_its_model(scene, reference):

@@ -28,10 +28,13 @@ class MethodComparison:
     results : list of MethodResult
     reference : MethodResult
         What errors are measured from: the resolved flow, or without it the scene's own method.
+    remarks : tuple of str
+        Why there is no resolved flow, and how to get it.
     """
 
     results: list[MethodResult]
     reference: MethodResult
+    remarks: tuple[str, ...] = ()
 
     def errors(self, result: MethodResult) -> tuple[float, float]:
         """Error of the permeability, and of the forces (rms), relative to the reference's."""
@@ -70,15 +73,19 @@ def compare(
     if not scene.walls.held.any():
         raise InputError(f"{scene_file}: no wall has a pressure, and nothing flows: there is nothing to compare")
     mesh = scene.pore_mesh()
-    if resolved is not False:
+    remarks = []
+    if resolved is None:
+        resolved = mesh.n_spheres <= RESOLVED_UP_TO
         try:
             require_ngsolve()
         except MissingExtraError:
-            if resolved:
-                raise
             resolved = False
-        if resolved is None:
-            resolved = mesh.n_spheres <= RESOLVED_UP_TO
+            remarks = ['The resolved flow needs an extra: pip install "porefv[reference]"']
+        else:
+            if not resolved:
+                remarks = [f"The resolved flow is computed up to {RESOLVED_UP_TO} spheres, or with --resolved."]
+    elif resolved:
+        require_ngsolve()
     own = scene.flow.conductance.name
     results = []
     for method in methods(tuple(MODELS), own, mesh.n_pores > DIRECT_LIMIT, bool(resolved)):
@@ -87,4 +94,4 @@ def compare(
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             results.append(pool.submit(measure, scene_file, method).result())
     reference = results[-1] if resolved else next(found for found in results if found.method.conductance == own)
-    return MethodComparison(results, reference)
+    return MethodComparison(results, reference, tuple(remarks))

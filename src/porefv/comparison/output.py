@@ -9,27 +9,36 @@ from pathlib import Path
 import numpy as np
 
 from porefv.comparison.comparison import MethodComparison
+from porefv.comparison.measurement import MethodResult
 
 
 def table(found: MethodComparison) -> str:
-    """The comparison as text."""
-    width = max(len(result.method.name) for result in found.results)
-    resolved = found.reference.method.conductance is None
-    origin = "the resolved flow" if resolved else f"{found.reference.method.name}, as there is no resolved flow"
-    lines = [
-        f"{'':{width}}  {'permeability':>12}  {'error':>8}  {'forces, rms':>11}  {'time':>9}  {'memory':>8}",
-    ]
+    """The comparison as text of at most 80 columns."""
+    width = max(len(_label(result)) for result in found.results)
+    lines = [f"{'':{width}} {'k, m²':>11} {'error':>10} {'forces, rms':>11} {'time':>8} {'memory':>8}"]
     for result in found.results:
         permeability, forces = found.errors(result)
         reference = result is found.reference
         lines.append(
-            f"{result.method.name:{width}}  {result.permeability:>12.5g}  "
-            f"{'-' if reference or np.isnan(permeability) else f'{100 * permeability:+.2g} %':>8}  "
-            f"{'-' if reference else f'{100 * forces:.2g} %':>11}  {_time(result.seconds):>9}  "
-            f"{_memory(result.memory):>8}{'  *' if found.is_best(result) else ''}"
+            f"{_label(result):{width}} {result.permeability:>11.5g} "
+            f"{'-' if reference or np.isnan(permeability) else f'{100 * permeability:+.2g} %':>10} "
+            f"{'-' if reference else f'{100 * forces:.2g} %':>11} {_time(result.seconds):>8} "
+            f"{_memory(result.memory):>8}{' *' if found.is_best(result) else ''}"
         )
-    lines.append(f"Errors are distances from {origin}. * No other method has better forces in less time.")
-    return "\n".join(lines)
+    if any(result.method.tolerance is not None for result in found.results):
+        lines.append("tolerance: of the solver, with the scene's own model")
+    if found.reference.method.conductance is None:
+        lines.append("Errors are distances from the resolved flow.")
+    else:
+        lines.append(f"Errors are distances from {found.reference.method.name}, as there is no resolved flow.")
+    lines.append("* No other method has better forces in less time.")
+    return "\n".join([*lines, *found.remarks])
+
+
+def _label(result: MethodResult) -> str:
+    """The name of a method in the table."""
+    tolerance = result.method.tolerance
+    return result.method.name if tolerance is None else f"  tolerance {tolerance:.0e}"
 
 
 def _memory(size: float) -> str:
@@ -54,24 +63,37 @@ def save(found: MethodComparison, folder: Path) -> None:
 
 
 def draw(found: MethodComparison, path: Path) -> None:
-    """Draw the error of the forces against time and against memory, the Pareto front joined."""
+    """Draw errors of the forces against time and memory: of models above, of the solver's tolerances below.
+
+    Models are measured from the reference, tolerances from the smallest of them. An error of zero stands on the lower
+    edge.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
-    axes = figure.subplots(1, 2, sharey=True)
-    others = [result for result in found.results if result is not found.reference]
-    for axis, measure, label in (
-        (axes[0], lambda result: result.seconds, "time, s"),
-        (axes[1], lambda result: result.memory / 2**20, "memory, MB"),
-    ):
-        for result in others:
-            error = max(found.errors(result)[1], 1e-12)
-            axis.loglog(measure(result), error, "o", label=result.method.name)
-        best = sorted((other for other in others if found.is_best(other)), key=measure)
-        axis.loglog([measure(o) for o in best], [max(found.errors(o)[1], 1e-12) for o in best], "k-", lw=0.7, zorder=0)
-        if found.reference.method.conductance is None:
-            axis.axvline(measure(found.reference), color="k", ls=":", label="resolved Stokes flow")
-        axis.set_xlabel(label)
-    axes[0].set_ylabel("error of the forces, rms")
-    axes[1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    models = [result for result in found.results if result.method.tolerance is None]
+    tolerances = [result for result in found.results if result.method.tolerance is not None]
+    rows = [("error of the forces, rms", models, found.reference)]
+    if tolerances:
+        rows.append(("error by the solver's tolerance, rms", tolerances, tolerances[-1]))
+    figure = Figure(figsize=(10, 4.0 * len(rows)), layout="constrained")
+    for axes, (label, results, reference) in zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True):
+        errors = [MethodComparison(results, reference).errors(result)[1] for result in results]
+        known = [error for error in errors if error > 0.0]
+        lowest = 10.0 ** np.floor(np.log10(min(known)) - 0.5) if known else 1e-3
+        for axis, measure, unit in (
+            (axes[0], lambda result: result.seconds, "time, s"),
+            (axes[1], lambda result: result.memory / 2**20, "memory, MB"),
+        ):
+            for result, error in zip(results, errors, strict=True):
+                place, name = measure(result), _label(result).strip()
+                if not (np.isfinite(place) and place > 0.0):
+                    continue
+                style = {"marker": "*", "s": 140, "color": "k"} if result is reference else {"marker": "o", "s": 45}
+                name = f"{name} (reference)" if result is reference else name
+                axis.scatter(place, error if error > 0.0 else lowest, label=name, clip_on=False, zorder=3, **style)
+            axis.set(xscale="log", yscale="log", xlabel=unit, ylabel=label, ylim=(lowest, None))
+            axis.grid(which="major", color="#dddddd")
+        axes[1].legend(
+            *axes[0].get_legend_handles_labels(), fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
+        )  # fmt: skip
     figure.savefig(path, dpi=110)
