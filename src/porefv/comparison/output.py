@@ -69,6 +69,7 @@ def draw(found: MethodComparison, path: Path) -> None:
     edge.
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     models = [result for result in found.results if result.method.tolerance is None]
     tolerances = [result for result in found.results if result.method.tolerance is not None]
@@ -79,7 +80,8 @@ def draw(found: MethodComparison, path: Path) -> None:
     for axes, (label, results, reference) in zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True):
         errors = [MethodComparison(results, reference).errors(result)[1] for result in results]
         known = [error for error in errors if error > 0.0]
-        lowest = 10.0 ** np.floor(np.log10(min(known)) - 0.5) if known else 1e-3
+        lowest = 10.0 ** np.floor(np.log10(min(known)) - 0.3) if known else 1e-3
+        highest = 10.0 ** np.ceil(np.log10(max(known)) + 0.1) if known else 1.0
         for axis, measure, unit in (
             (axes[0], lambda result: result.seconds, "time, s"),
             (axes[1], lambda result: result.memory / 2**20, "memory, MB"),
@@ -91,7 +93,14 @@ def draw(found: MethodComparison, path: Path) -> None:
                 style = {"marker": "*", "s": 140, "color": "k"} if result is reference else {"marker": "o", "s": 45}
                 name = f"{name} (reference)" if result is reference else name
                 axis.scatter(place, error if error > 0.0 else lowest, label=name, clip_on=False, zorder=3, **style)
-            axis.set(xscale="log", yscale="log", xlabel=unit, ylabel=label, ylim=(lowest, None))
+            places = [place for place in map(measure, results) if np.isfinite(place) and place > 0.0]
+            if places and max(places) > 10.0 * min(places):
+                axis.set_xscale("log")
+            else:
+                axis.set_xlim(0.0, 1.15 * max(places, default=1.0))
+            axis.set(yscale="log", xlabel=unit, ylabel=label, ylim=(lowest, highest))
+            axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
+            axis.yaxis.set_minor_formatter(NullFormatter())
             axis.grid(which="major", color="#dddddd")
         axes[1].legend(
             *axes[0].get_legend_handles_labels(), fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
