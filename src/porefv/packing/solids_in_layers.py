@@ -55,12 +55,25 @@ def solids_in_layers(centres, radii, lower, upper, starts, others, axis, edges, 
         r = radii[i]
         count = _planes(i, centres, radii, lower, upper, starts, others, normals, distances)
         below, above = distances[2 * axis], distances[2 * axis + 1]
-        layer = max(np.searchsorted(edges, centres[i, axis] - r, "right") - 1, 0)
+        layer = _layer_of(centres[i, axis] - r, edges)
         while count > 0 and layer < len(solids) and edges[layer] < centres[i, axis] + r:
             distances[2 * axis] = min(below, (centres[i, axis] - edges[layer]) / r)
             distances[2 * axis + 1] = min(above, (edges[layer + 1] - centres[i, axis]) / r)
             solids[layer] += _ball_in_polyhedron(count, normals, distances, polygon, cut) * r * r * r
             layer += 1
+
+
+@helper
+def _layer_of(place, edges):
+    """Layer of a place, the first for those below all edges: numba's searchsorted makes loading the kernel slow."""
+    low, high = 0, len(edges)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if edges[middle] <= place:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @helper
