@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from porefv.errors import InputError
+from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.box import Box
 from porefv.packing.overlaps import cap_volume, lens_volume
 from porefv.packing.packing import Packing, Source
@@ -332,3 +332,14 @@ def test_bounding_box_holds_every_sphere_with_few_digits():
         extent = (packing.centres + packing.radii[:, None]).max(axis=0)
         np.testing.assert_allclose(box.upper, extent, atol=2e-5 * scale)
     np.testing.assert_allclose(Packing([[0.5, 0.5, 0.5]], [0.4]).bounding_box.upper, 0.9, rtol=1e-15)
+
+
+def test_spheres_that_are_nearly_the_same_are_warned_of():
+    centres = [[0.3, 0.3, 0.3], [0.7, 0.7, 0.7], [0.3 + 1e-7, 0.3, 0.3]]
+    with pytest.warns(PackingFileWarning, match="in 1 pair: sphere 0 and sphere 2.* remove one of each pair"):
+        Packing(centres, [0.1, 0.1, 0.1], UNIT).validate()
+
+
+def test_deep_overlaps_that_are_no_duplicates_are_not_warned_of(recwarn):
+    Packing([[0.3, 0.3, 0.3], [0.32, 0.3, 0.3]], [0.1, 0.1], UNIT).validate()
+    assert not recwarn.list
