@@ -128,10 +128,11 @@ def test_the_command_has_the_formats_of_the_function():
     assert command.FORMATS == FORMATS
 
 
-def test_pyvista_finds_the_pressures_and_volumes_of_the_pores_in_the_cells(flow, found, tmp_path):
+@pytest.mark.parametrize("extension", ["vtk", "vtu"])
+def test_pyvista_finds_the_pressures_and_velocities_of_the_pores_in_the_cells(flow, found, tmp_path, extension):
     pyvista = pytest.importorskip("pyvista")
     pytest.importorskip("meshio")
-    grid = pyvista.read(export(found, tmp_path / "pores.vtu", "vtu")[0])
+    grid = pyvista.read(export(found, tmp_path / f"pores.{extension}", extension)[0])
     pores = grid.cell_data["pore"]
     assert grid.n_cells == flow.mesh.n_cells and set(pores) == set(range(flow.mesh.n_pores))
     np.testing.assert_array_equal(grid.cell_data["pressure"], flow.pressure[pores])
