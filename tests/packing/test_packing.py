@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from porefv.errors import InputError
+from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.box import Box
 from porefv.packing.overlaps import cap_volume, lens_volume
 from porefv.packing.packing import Packing, Source
@@ -353,3 +353,14 @@ def test_a_cropped_packing_with_a_centre_beside_a_wall_needs_more_than_nearly_on
     with pytest.raises(InputError, match="reaches beyond a wall by more than 0.99 of its radius"):
         cropped.validate(wall_tolerance=0.99)
     cropped.validate(wall_tolerance=1.0)
+
+
+def test_spheres_that_are_nearly_the_same_are_warned_of():
+    centres = [[0.3, 0.3, 0.3], [0.7, 0.7, 0.7], [0.3 + 1e-7, 0.3, 0.3]]
+    with pytest.warns(PackingFileWarning, match="in 1 pair: sphere 0 and sphere 2.* remove one of each pair"):
+        Packing(centres, [0.1, 0.1, 0.1], UNIT).validate()
+
+
+def test_deep_overlaps_that_are_no_duplicates_are_not_warned_of(recwarn):
+    Packing([[0.3, 0.3, 0.3], [0.32, 0.3, 0.3]], [0.1, 0.1], UNIT).validate()
+    assert not recwarn.list

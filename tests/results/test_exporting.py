@@ -126,3 +126,22 @@ def test_without_the_quantity_pressure_the_network_has_no_pressures(flow, tmp_pa
 
 def test_the_command_has_the_formats_of_the_function():
     assert command.FORMATS == FORMATS
+
+
+@pytest.mark.parametrize("extension", ["vtk", "vtu"])
+def test_pyvista_finds_the_pressures_and_velocities_of_the_pores_in_the_cells(flow, found, tmp_path, extension):
+    pyvista = pytest.importorskip("pyvista")
+    pytest.importorskip("meshio")
+    grid = pyvista.read(export(found, tmp_path / f"pores.{extension}", extension)[0])
+    pores = grid.cell_data["pore"]
+    assert grid.n_cells == flow.mesh.n_cells and set(pores) == set(range(flow.mesh.n_pores))
+    np.testing.assert_array_equal(grid.cell_data["pressure"], flow.pressure[pores])
+    np.testing.assert_allclose(grid.cell_data["velocity"], flow.pore_velocity[pores], rtol=1e-12)
+
+
+def test_pyvista_finds_the_spheres_and_their_radii_in_the_results(flow, found):
+    pyvista = pytest.importorskip("pyvista")
+    (path,) = Path(found.directory).rglob("spheres.vtp")
+    spheres = pyvista.read(path)
+    np.testing.assert_array_equal(spheres.points, flow.mesh.packing.centres)
+    np.testing.assert_array_equal(spheres.point_data["radius"], flow.mesh.packing.radii)

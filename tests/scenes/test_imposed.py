@@ -166,3 +166,24 @@ def test_contradictions_are_found_by_check_and_before_anything_is_computed(write
 def test_flows_that_cannot_be_compared_are_refused(write_scene, capsys):
     assert cli.main(["trade", str(write_scene())]) == 2
     assert "only flows that pressures of walls drive" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("key", ["velocity", "inflow"])
+def test_an_imposed_flow_of_zero_has_no_permeability_and_the_wall_is_named(write_scene, key):
+    with pytest.raises(InputError, match=r"scene.toml, line 3: .*the flow imposed on y_min is zero: nothing flows"):
+        FlowScene.read(write_scene(f"{{ {key} = 0.0 }}", quantities='["permeability"]'))
+    FlowScene.read(write_scene(f"{{ {key} = 0.0 }}", quantities='["pressure"]'))
+
+
+def test_check_finds_a_region_without_pores(write_scene, capsys):
+    region = "[[sources]]\nsphere = { centre = [0.5, 0.5, 0.5], radius = 1e-9 }\nflow = 1e-3"
+    assert cli.main(["check", str(write_scene(more=region))]) != 0
+    assert "scene.toml: no pore has its Laguerre vertex in the sphere of radius 1e-09 m" in capsys.readouterr().err
+
+
+def test_planes_outside_the_box_are_named_by_their_line(write_scene):
+    path = write_scene()
+    path.write_text(path.read_text() + 'axis = "y"\nplanes = [0.5, 2.0]\n')
+    path.write_text(path.read_text().replace('"forces"', '"planes"'))
+    with pytest.raises(InputError, match=r"scene.toml, line 9: \[output\] planes must lie inside the box"):
+        FlowScene.read(path).check()

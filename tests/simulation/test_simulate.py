@@ -587,3 +587,17 @@ def test_the_page_names_every_column_and_its_scenes_are_sound():
 def test_check_validates_every_kind_of_scene(name, capsys):
     assert main(["check", str(ROOT / "data" / "scenes" / f"{name}.toml")]) == 0
     assert "in a box of" in capsys.readouterr().out
+
+
+def test_the_record_says_how_the_packing_file_was_read(path):
+    reading = SimulationScene.from_mapping(tomllib.loads(DRY)).read_packing().reading
+    assert read_record(run(path, DRY)).reading == reading.as_data()
+
+
+def test_check_reads_the_packing_file_once(path, monkeypatch):
+    path.write_text(DRY)
+    reads = []
+    read_packing = SimulationScene.read_packing
+    monkeypatch.setattr(SimulationScene, "read_packing", lambda scene: reads.append(scene) or read_packing(scene))
+    assert main(["check", str(path)]) == 0
+    assert len(reads) == 1

@@ -45,8 +45,9 @@ def run(options: argparse.Namespace) -> None:
 
         simulation = SimulationScene.read(options.scene)
         with progress.stage("validation"):
-            grains = check(simulation)
-        say(simulate.scene_text(simulation, grains))
+            packing = simulation.read_packing()
+            grains = check(simulation, packing)
+        say(simulate.scene_text(simulation, packing, grains))
     elif "grains" in keys:
         from porefv.cli import pack
         from porefv.scenes.packing_scene import PackingScene

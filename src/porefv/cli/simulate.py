@@ -12,6 +12,7 @@ from porefv.errors import InputError, counted
 
 if TYPE_CHECKING:
     from porefv.dem.dem import DEM
+    from porefv.packing.packing import Packing
     from porefv.scenes.simulation_scene import SimulationScene
     from porefv.simulation.run_record import RunRecord
 
@@ -61,11 +62,11 @@ def outcome_text(record: RunRecord, directory: Path) -> str:
     return "\n".join([*lines, f"results in {path_text(directory)}"])
 
 
-def scene_text(scene: SimulationScene, grains: DEM) -> str:
+def scene_text(scene: SimulationScene, packing: Packing, grains: DEM) -> str:
     """What `porefv check` says of a simulation."""
     size = " × ".join(f"{length:g}" for length in grains.box.size)
     lines = [
-        f"read as {scene.read_packing().reading}",
+        f"read as {packing.reading}",
         f"{counted(len(grains), 'grain')} in a box of {size} m, porosity {grains.porosity:.4f}, "
         f"{grains.coordination:.1f} contacts a grain",
         f"steps of {grains.step:.3g} s; results to {scene.output.directory}",

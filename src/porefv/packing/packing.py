@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,7 +11,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from porefv.errors import InputError, counted, vector
+from porefv.errors import InputError, PackingFileWarning, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
 from porefv.packing.reading import Reading
@@ -20,6 +21,7 @@ _MOST_SHOWN = 5  # culprits listed in one error
 
 # Spheres that differ by less, relative to the radius of the smaller, are at one place.
 _WITHIN = 1e-9
+_NEARLY_WITHIN = 0.02  # likewise, of which a warning says that they may be the same sphere
 
 # Lengths whose sixth powers a double holds, which is what the geometry of throats multiplies; and the smallest radius,
 # relative to the box, whose place in it rounding leaves.
@@ -330,7 +332,22 @@ class Packing:
             lambda k: self._describe_within(pairs[k, 0], pairs[k, 1]),
             "Remove the inner sphere of each pair, or correct centres and radii.",
         )
+        self._warn_nearly_within()
         return self
+
+    def _warn_nearly_within(self) -> None:
+        """Warn of spheres that lie within another but for a small part: most are the same sphere, given twice."""
+        pairs = self.overlaps.pairs
+        nearly = np.flatnonzero(self.overlaps.depths >= (2.0 - _NEARLY_WITHIN) * self.radii[pairs].min(axis=1))
+        if len(nearly):
+            shown = "; ".join(f"{self._name(i)} and {self._name(j)}" for i, j in pairs[nearly[:_MOST_SHOWN]])
+            more = f"; and {len(nearly) - _MOST_SHOWN} more" if len(nearly) > _MOST_SHOWN else ""
+            warnings.warn(
+                f"{self._path()}one sphere lies within another but for less than {_NEARLY_WITHIN:g} of its radius, in "
+                f"{counted(len(nearly), 'pair')}: {shown}{more}. If they are the same sphere, remove one of each pair.",
+                PackingFileWarning,
+                stacklevel=3,
+            )
 
     def __len__(self) -> int:
         return len(self.radii)

@@ -24,8 +24,9 @@ from porefv.results.reading import Results
 from porefv.system.atomic_files import atomic_write, finished_name, locked
 
 # meshio's name of the format for each extension: formats that are one file and have all cells.
+# In version 5.1 of .vtk meshio calls integers of 32 bits by a name that VTK does not read, which loses all fields.
 MESH_FORMATS = {
-    "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk", "vtu": "vtu",
+    "inp": "abaqus", "mesh": "medit", "msh": "gmsh22", "nas": "nastran", "vtk": "vtk42", "vtu": "vtu",
 }  # fmt: skip
 # VTK files get the fields. The others get the number of the pore, which some write as a label of the cells. Gmsh wants
 # labels of its own, and meshio cannot read files of Gmsh that have both these and fields.

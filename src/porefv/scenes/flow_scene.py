@@ -16,7 +16,7 @@ from porefv.flow.directional_permeabilities import (
     slip_of_impervious_walls,
 )
 from porefv.flow.fluid import Fluid
-from porefv.flow.inside import FixedPressure, FlowSource
+from porefv.flow.inside import FixedPressure, FlowSource, imposed_inside
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls, condition_text
 from porefv.mesh.pore_mesh import PoreMesh
@@ -25,7 +25,7 @@ from porefv.packing.free_space import wall_layers, warn_of_free_space
 from porefv.packing.packing import Packing
 from porefv.results.quantity_tables import Sections
 from porefv.results.writing import QUANTITIES, check_target, save, stages, writing
-from porefv.scenes.errors import refused
+from porefv.scenes.errors import input_error, refused
 from porefv.scenes.region_tables import FixedPressureTable, SourceTable
 from porefv.scenes.shared_tables import (
     BoxOrFit,
@@ -38,6 +38,7 @@ from porefv.scenes.shared_tables import (
     SixWalls,
 )
 from porefv.scenes.table import MadeFrom, Scene, Table
+from porefv.scenes.toml_file import SceneSource
 from porefv.scenes.values import Choice, Choices, Limits, Numbers, ScenePath, Vector, Whole, key
 from porefv.solvers.solver import SOLVERS, TOLERANCE
 from porefv.system.progress import Progress
@@ -220,6 +221,14 @@ class FlowScene(Scene):
                 "Give for instance\n[walls]\ny_min = { pressure = 1.0 }\ny_max = { pressure = 0.0 }"
             )
         axis, pressures = self.walls.axis, self.walls.pressures
+        stopped = [name for name, wall in passed if 0.0 in (wall.inflow, wall.velocity)]
+        if "permeability" in asked and axis is not None and stopped:
+            wall = next(wall for name, wall in passed if name == stopped[0])
+            raise refused(
+                f"the flow imposed on {stopped[0]} is zero: nothing flows from wall to wall, and there is no "
+                "permeability. Give a flow other than zero, or drop permeability from the quantities.",
+                "walls", stopped[0], "inflow" if wall.inflow is not None else "velocity",
+            )  # fmt: skip
         if "permeability" in asked:
             described = ", ".join(f"{name} at {condition_text(vars(wall))}" for name, wall in passed)
             if axis is None or pressures[2 * axis] == pressures[2 * axis + 1]:
@@ -290,6 +299,14 @@ class FlowScene(Scene):
             slip=slip_of_impervious_walls(self.walls), solver=self.flow.solver, tolerance=self.flow.tolerance,
         )  # fmt: skip
 
+    def _check_sections(self, box: Box) -> None:
+        """InputError, with the line of the key, for planes outside the box."""
+        try:
+            self.output.sections.check(self.output.quantities, self.walls, box)
+        except InputError as error:
+            source = SceneSource.read(self.path) if self.path else SceneSource(dict(self.data))
+            raise input_error(refused(str(error), "output", "planes"), source) from None
+
     def solve(self, *, force: bool = False, progress: Progress | None = None) -> Path:
         """Compute what `output` asks for, and write the results directory.
 
@@ -319,7 +336,7 @@ class FlowScene(Scene):
                 packing = self.read_packing()
             with progress.stage("validation"):
                 mesh = self.pore_mesh(packing)
-            output.sections.check(output.quantities, self.walls, mesh.box)
+            self._check_sections(mesh.box)
             flow = self.pore_flow(mesh) if self.driven else None
             save(
                 folder, mesh, flow, quantities=output.quantities, vtk=output.vtk, table_format=output.table_format,
@@ -334,7 +351,9 @@ class FlowScene(Scene):
         return ("reading", "validation", *stages(self.output.quantities, self.output.vtk))
 
     def check(self) -> Packing:
-        """Read and validate everything `solve` would, computing nothing; the packing.
+        """Read and validate everything `solve` would, computing no flow; the packing.
+
+        The mesh is built only if the scene has regions, to find those without pores.
 
         Raises
         ------
@@ -346,5 +365,10 @@ class FlowScene(Scene):
         warn_of_free_space(wall_layers(mesh.packing), mesh.packing)
         if self.driven:
             self.pore_flow(mesh)
-        self.output.sections.check(self.output.quantities, self.walls, mesh.box)
+            if self.sources or self.pressures:
+                try:
+                    imposed_inside(mesh, self.walls, self.sources, self.pressures)
+                except InputError as error:
+                    raise InputError(f"{self.path or 'scene'}: {error}") from None
+        self._check_sections(mesh.box)
         return mesh.packing

@@ -207,6 +207,8 @@ class SimulationScene(Scene):
         """The packing, in the scene's box or its own."""
         return self.packing.read(self.path, self.box)
 
-    def grains(self) -> DEM:
-        """The grains at the start, between walls that stand."""
-        return DEM(self.read_packing(), self.material, gravity=self.gravity, step=self.step)
+    def grains(self, packing: Packing | None = None) -> DEM:
+        """The grains at the start, between walls that stand; of the packing, which is read if it is not given."""
+        return DEM(
+            self.read_packing() if packing is None else packing, self.material, gravity=self.gravity, step=self.step
+        )

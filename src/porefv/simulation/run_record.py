@@ -113,6 +113,8 @@ class RunRecord:
     seconds : float
         By the clock.
     checkpoint : CheckpointRecord or None
+    reading : dict or None
+        What was understood of the packing file, as plain data of `porefv.packing.reading.Reading`.
     """
 
     scene: dict[str, Any]
@@ -123,6 +125,7 @@ class RunRecord:
     permeability: list[PermeabilityRecord] = field(default_factory=list)
     seconds: float = 0.0
     checkpoint: CheckpointRecord | None = None
+    reading: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         must(self.status in STATUSES, f"no run is {self.status!r}")

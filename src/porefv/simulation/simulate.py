@@ -19,6 +19,7 @@ from porefv.errors import FORCE_OPTION, ComputationError, InputError, printable
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.overlaps import sphere_volumes
+from porefv.packing.packing import Packing
 from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScene
 from porefv.scenes.stage import Rest, Stage
 from porefv.simulation import measurements
@@ -93,8 +94,10 @@ def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) 
         return
     if record is None:
         check_directory(directory, force or resume)
-        dem = scene.grains()
-        record = RunRecord(dict(scene.data), _path_of(scene), dem.box.size.tolist())
+        packing = scene.read_packing()
+        dem = scene.grains(packing)
+        reading = None if packing.reading is None else packing.reading.as_data()
+        record = RunRecord(dict(scene.data), _path_of(scene), dem.box.size.tolist(), reading=reading)
         running = _Run(scene, record, dem, None, progress)
     else:
         dem, coupling = record.load(directory, scene.coupling.conductance)
@@ -118,8 +121,14 @@ def _path_of(scene: SimulationScene) -> str | None:
     return printable(str(scene.path)) if scene.path else None
 
 
-def check(scene: SimulationScene) -> DEM:
+def check(scene: SimulationScene, packing: Packing | None = None) -> DEM:
     """Read and validate everything `run` would, moving nothing; the grains at the start.
+
+    Parameters
+    ----------
+    scene : SimulationScene
+    packing : Packing, optional
+        Of the scene, if it has been read. Default: it is read.
 
     Raises
     ------
@@ -128,7 +137,7 @@ def check(scene: SimulationScene) -> DEM:
     """
     _check_packages(scene)
     check_directory(scene.output.directory, force=True)
-    grains = scene.grains()
+    grains = scene.grains(packing)
     if any(stage.fluid for stage in scene.stages):
         PoreMesh(grains.packing)
     return grains

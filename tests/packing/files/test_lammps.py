@@ -265,3 +265,36 @@ def test_a_tilt_of_zero_is_no_tilt(read):
         content = content.replace(f"{side}\n", f"{side} 0.0\n", 1)
     assert read(content).box.volume == 16
     assert read(DATA.replace("Masses", "0 0 0 xy xz yz\n\nMasses")).box.volume == 50
+
+
+@pytest.mark.parametrize("words", ["units cgs", "units = cgs", "units: cgs", "in cgs units", "Units CGS"])
+def test_a_title_states_units_in_words(read, words):
+    packing = read(DATA.replace("any title", f"a title, {words}"))
+    assert packing.reading.units == "cgs (cm)"
+    np.testing.assert_allclose(packing.radii, [0.0005, 0.001, 0.0015], rtol=1e-15)
+
+
+def test_a_title_that_speaks_of_units_without_naming_them_states_none(read):
+    assert read(DATA.replace("any title", "units differ")).reading.units == ""
+
+
+def test_atoms_without_a_style_are_said_to_be_read_as_spheres(read):
+    assert read(DATA.replace("Atoms  # sphere", "Atoms")).reading.notes == (
+        "no style after Atoms, read as atom_style sphere",
+    )
+    assert read(DATA).reading.notes == ()
+
+
+def test_a_frame_without_atoms_is_named(read):
+    empty = frame(1, 1).split("2 1 0.5")[0].replace("ATOMS\n2", "ATOMS\n0")
+    with pytest.raises(InputError, match=r"line 15: frame 1 of 2 \(from 0\) has no atoms. Choose another as frame."):
+        read(frame(0, 1) + empty)
+    assert len(read(frame(0, 1) + empty, frame=0)) == 2
+
+
+def test_one_frame_without_a_line_end_is_warned_of(read):
+    with pytest.warns(PackingFileWarning, match="may have lost digits"):
+        read(frame(0, 0.125).rstrip("\n"))
+    whole = DATA.partition("Velocities")[0].replace(" 0 0 0\n", "\n").replace(" 0 0 0  #", " #").rstrip()
+    with pytest.warns(PackingFileWarning, match="may have lost digits"):
+        read(whole)

@@ -186,3 +186,26 @@ def test_damaged_gzip_files_are_refused(read):
     ):
         with pytest.raises(InputError, match=said):
             read(content, "a.data.gz")
+
+
+def test_a_unit_in_the_comment_of_extended_xyz_is_honoured(read):
+    for key in ("units=mm", "Unit=mm", 'length_unit="mm"'):
+        packing = read(XYZ.format(0.1).replace("Time=1", key), "grains.xyz")
+        np.testing.assert_allclose(packing.radii, 1e-4, rtol=1e-15)
+        np.testing.assert_allclose(packing.box.upper, [1e-3, 2e-3, 3e-3], rtol=1e-15)
+    with pytest.raises(InputError, match=r"line 2: lengths are in 'furlong'.* as scale"):
+        read(XYZ.format(0.1).replace("Time=1", "units=furlong"), "grains.xyz")
+
+
+def test_a_row_too_many_is_not_called_a_frame_that_is_cut_off(read):
+    row = "0.7 0.8 0.9 0 0 0 0.1 0 0 0 0 0 0 0\n"
+    with pytest.raises(
+        InputError, match="line 4: a row of a sphere where the frame ends. Its header, line 1, declares 2"
+    ):
+        read(MERCURY.format(0.1) + row)
+
+
+def test_one_frame_of_xyz_without_a_line_end_is_warned_of(read):
+    content = "1\nProperties=pos:R:3:radius:R:1\n0.1 0.2 0.3 0.12"
+    with pytest.warns(PackingFileWarning, match="line 3: the last line has no line end"):
+        read(content, "grains.xyz")

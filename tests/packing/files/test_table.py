@@ -222,3 +222,88 @@ def test_the_content_comes_before_the_extension(read):
     for name in ("a.csv", "a.txt", "a.liggghts", "a", "a.stl"):
         assert read(dump + "0.5 0.5 0.5 0.1\n", name).reading.format == "LAMMPS dump"
         assert read("x;y;z;r\n1;2;3;4\n", name if name != "a.liggghts" else "b").radii[0] == 4
+
+
+FRAMES = "time,id,x,y,z,radius\n0,1,1,2,3,1\n0,2,5,6,7,1\n0.5,1,2,2,3,1\n0.5,2,6,6,7,1\n"
+
+
+@pytest.mark.parametrize("name", ["time", "Time [s]", "t", "timestep", "Frame", "STEP"])
+def test_a_table_of_several_times_needs_the_choice_of_a_frame(read, name):
+    content = FRAMES.replace("time", name)
+    with pytest.raises(InputError, match=r"has 2 values \(0.0, 0.5\).*Give frame, 0 to 1"):
+        read(content)
+    for frame, x in ((0, [1, 5]), (1, [2, 6]), (-1, [2, 6])):
+        packing = read(content, frame=frame)
+        np.testing.assert_array_equal(packing.centres[:, 0], x)
+        assert (packing.reading.frame, packing.reading.frames) == (frame % 2, 2)
+    with pytest.raises(InputError, match="frame 2 is asked for, and the file has 2 frames"):
+        read(content, frame=2)
+
+
+def test_a_table_of_one_time_has_one_frame(read):
+    assert len(read("time,x,y,z,r\n3,1,2,3,1\n3,5,6,7,1\n")) == 2
+
+
+def test_an_id_that_occurs_twice_is_refused(read, error):
+    content = FRAMES.replace("time", "mass")
+    assert error(content) == (
+        ", line 4: id '1' stands on line 2 already. Does the table hold several frames? Keep the rows of one; or "
+        "rename the column if it is no id of spheres."
+    )
+
+
+@pytest.mark.parametrize("names", ["R,G,B", "r,g,b", "B,G,r"])
+def test_a_colour_is_not_taken_for_a_radius(read, names):
+    content = f"x,y,z,{names}\n1,2,3,0.1,0.2,0.3\n"
+    with pytest.raises(InputError, match="may be a colour or the radius. Map the radius"):
+        read(content)
+    r = names.lower().split(",").index("r")
+    np.testing.assert_array_equal(read(content, columns={"radius": names.split(",")[r]}).radii, [[0.1, 0.2, 0.3][r]])
+    np.testing.assert_array_equal(read(content.replace("x", "radius,x").replace("\n1", "\n9,1")).radii, [9])
+    np.testing.assert_array_equal(read(content, radius=0.5).radii, [0.5])
+
+
+def test_two_things_are_not_read_from_one_column(read):
+    with pytest.raises(InputError, match="maps 'a' to both x and y"):
+        read("a,b,c,r\n1,2,3,4\n", columns={"x": "a", "y": "a", "z": "c"})
+
+
+def test_a_last_number_without_a_line_end_is_warned_of(read, recwarn):
+    content = "x,y,z,r\n1,2,3,0.4\n1,2,5,0.45"
+    with pytest.warns(PackingFileWarning, match=r"line 3: the last line has no line end.*may have lost digits"):
+        packing = read(content)
+    assert "no line end" in packing.reading.notes[0]
+    recwarn.clear()
+    read(content + "\n")
+    read("x,y,z,r,density\n1,2,3,0.4,25")  # what may have lost digits is not read
+    read(content + "\n# end")
+    assert not [warning for warning in recwarn if warning.category is PackingFileWarning]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("0,5 0,5 0,5 0,1\n0,2 0,5 0,5 0,1\n", "decimal commas. Write decimals with a point."),
+        ("0,5;0,5;0,5;0,1\n", "decimal commas. Write decimals with a point."),
+        ("1.0D-01 2.0D-01 3.0D-01 1.0D-02\n", "exponents of Fortran with D. Write them with E, as in 1.0E-3."),
+        ("1.0D-01,2.0D-01,3.0D-01,1.0D-02\n", "exponents of Fortran with D. Write them with E, as in 1.0E-3."),
+    ],
+)
+def test_numbers_written_otherwise_are_no_header(read, error, content, message):
+    assert message in error(content)
+
+
+def test_an_exponent_with_d_under_a_header_is_explained(read, error):
+    assert (
+        error("x,y,z,r\n1.0D-3,2,3,4\n")
+        == ", line 2: x is '1.0D-3', not a number. Write exponents with E instead of D."
+    )
+
+
+@pytest.mark.parametrize("header", ["x,y,z,r", "# x,y,z,r"])
+def test_units_may_stand_under_the_names(read, header):
+    packing = read(f"{header}\nmm,[mm],(mm),cm\n1000,2000,3000,4\n1000,2000,5000,4\n")
+    np.testing.assert_allclose(packing.centres[0], [1, 2, 3], rtol=1e-15)
+    np.testing.assert_allclose(packing.radii, 0.04, rtol=1e-15)
+    with pytest.raises(InputError, match="line 2: the unit under 'x_mm' is 'm'"):
+        read("x_mm,y_mm,z_mm,r_mm\nm,m,m,m\n1,2,3,4\n")

@@ -1,4 +1,5 @@
 import gzip
+import warnings
 
 import numpy as np
 import pytest
@@ -137,3 +138,41 @@ def test_the_array_of_the_radius_can_be_mapped_and_lengths_scaled(tmp_path, poin
         assert Packing.read(tmp_path / "a.vtp", radius=0.3).radii[0] == 0.3
     (tmp_path / "a.vtp.gz").write_bytes(gzip.compress((tmp_path / "a.vtp").read_bytes()))
     assert len(Packing.read(tmp_path / "a.vtp.gz")) == 2
+
+
+LEGACY = """# vtk DataFile Version 3.0
+spheres
+ASCII
+DATASET POLYDATA
+POINTS 2 double
+0 0 0
+1 1 1
+POINT_DATA 2
+SCALARS radius double 1
+LOOKUP_TABLE default
+0.25
+0.375"""
+
+
+def test_the_last_number_of_a_legacy_file_without_a_line_end_is_warned_of(tmp_path):
+    file = tmp_path / "grains.vtk"
+    file.write_text(LEGACY)
+    with pytest.warns(PackingFileWarning, match="may have lost digits"):
+        Packing.read(file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", PackingFileWarning)
+        for whole in (LEGACY + "\n", LEGACY + "\nMETADATA"):
+            file.write_text(whole)
+            np.testing.assert_array_equal(Packing.read(file).radii, [0.25, 0.375])
+
+
+def test_the_last_whole_frame_of_a_list_is_read(tmp_path):
+    for name, text in (("0.vtk", LEGACY + "\n"), ("1.vtk", LEGACY[:-8])):
+        (tmp_path / name).write_text(text)
+    frames = "".join(f'<DataSet timestep="{k}" file="{k}.vtk"/>' for k in range(2))
+    (tmp_path / "grains.pvd").write_text(f'<VTKFile type="Collection"><Collection>{frames}</Collection></VTKFile>')
+    with pytest.warns(PackingFileWarning, match="'1.vtk': the last frame is cut off"):
+        packing = Packing.read(tmp_path / "grains.pvd")
+    assert (packing.reading.frame, packing.reading.frames) == (0, 1)
+    with pytest.raises(InputError, match="its frame 1 cannot be read"):
+        Packing.read(tmp_path / "grains.pvd", frame=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,7 @@ def chosen_columns(
     place = f"{path}, line {line}" if line else f"{path}"
     names = [name.strip().strip("\"'").strip() for name in names]
     found: list[Column] = []
+    colour = _colour(names)
     sized = any(role in options.columns for role in ("radius", "diameter"))
     for role in wanted:
         if role in options.columns:
@@ -117,10 +118,27 @@ def chosen_columns(
             found += [
                 Column(role, position, name, known[1])
                 for position, name in enumerate(names)
-                if (known := recognised(name)) and known[0] == role
+                if (known := recognised(name)) and known[0] == role and position != colour
             ]
-    if options.radius is not None and (sizes := roles(names, options) & {"radius", "diameter"}):
+    sized_names = [name for position, name in enumerate(names) if position != colour]
+    if colour is not None and options.radius is None and not roles(sized_names, options) & {"radius", "diameter"}:
+        if names[colour] not in options.columns.values():
+            raise InputError(
+                f"{place}: {quoted(names[colour])} beside columns g and b may be a colour or the radius. Map the "
+                f'radius, as in columns = {{ radius = "{names[colour]}" }}, or give one radius of '
+                "all spheres as radius, in m."
+            )
+    if options.radius is not None and (sizes := roles(sized_names, options) & {"radius", "diameter"}):
         warn_radius(place, f"the column of {' and '.join(sorted(sizes))}")
+    mapped: dict[int, str] = {}
+    for column in found:
+        if column.role in options.columns:
+            other = mapped.setdefault(column.position, column.role)
+            if other != column.role:
+                raise InputError(
+                    f"{place}: columns maps {quoted(column.name)} to both {other} and {column.role}. Give "
+                    "each a column of its own."
+                )
     given = {column.role for column in found}
     missing = [role for role in ("x", "y", "z") if role in wanted and role not in given]
     if options.radius is None and not given & {"radius", "diameter"}:
@@ -134,6 +152,12 @@ def chosen_columns(
             'columns = { x = "...", y = "...", z = "...", radius = "..." }.'
         )
     return found
+
+
+def _colour(names: Sequence[str]) -> int | None:
+    """Position of a column r that may be the red of a colour: there are columns g and b, too."""
+    lower = [name.lower() for name in names]
+    return lower.index("r") if {"r", "g", "b"} <= set(lower) else None
 
 
 def _mapped(place: str, role: str, names: list[str], wanted: str) -> Column:
@@ -202,6 +226,31 @@ def spheres(
     centres = np.column_stack([found[axis][0] for axis in "xyz"])
     radii = found["radius"][0] if "radius" in found else None
     return centres, radii, unit, {role: name for role, (_, name) in found.items()}
+
+
+def agreed_unit(unit: LengthUnit | None, stated: LengthUnit | None, options: ReadOptions) -> LengthUnit | None:
+    """The unit of the names of columns, or else that stated elsewhere in the file; InputError if they differ."""
+    if unit and stated and unit.metres != stated.metres and options.scale is None:
+        raise InputError(
+            f"{stated.place}: the unit is {quoted(stated.name)}, and the names of columns state {quoted(unit.name)}. "
+            "Give the length of the unit in m as scale."
+        )
+    return unit or stated
+
+
+def units_below(place: str, columns: Sequence[Column], cells: Sequence[str]) -> list[Column] | None:
+    """The columns with the units that a row under the header states; None if the row is none of units."""
+    if any(column.position >= len(cells) for column in columns):
+        return None
+    units = [cells[column.position].strip().strip("[]()").strip() for column in columns]
+    if not all(unit.lower() in UNITS for unit in units):
+        return None
+    for column, unit in zip(columns, units, strict=True):
+        if column.unit and column.unit.lower() != unit.lower():
+            raise InputError(
+                f"{place}: the unit under {quoted(column.name)} is {quoted(unit)}. Correct the name or the unit."
+            )
+    return [replace(column, unit=unit) for column, unit in zip(columns, units, strict=True)]
 
 
 def _agree(first: NDArray, second: NDArray) -> bool:

@@ -21,6 +21,17 @@ def chosen_frame(path: AnyPath, frames: int, options: ReadOptions) -> int:
     return options.frame % frames
 
 
+def warn_no_end(place: str) -> str:
+    """Warn that the last number of a file that is read has no end of line after it; the note about it."""
+    note = "the last line has no line end: if the file was cut off, its last number may have lost digits"
+    warnings.warn(
+        f"{place}: {note}. Compare it with its source, and end the line if it is whole.",
+        PackingFileWarning,
+        stacklevel=3,
+    )
+    return note
+
+
 def warn_cut_off(place: str, whole: int) -> str:
     """Warn that the last frame of a file is not whole; the note about it."""
     note = (

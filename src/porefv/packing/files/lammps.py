@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from porefv.errors import InputError
 from porefv.packing.files.column_names import Column, chosen_columns, positions, recognised, spheres
 from porefv.packing.files.content import FileContent, LengthUnit, periodicity
-from porefv.packing.files.frames import chosen_frame, warn_cut_off
+from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, text_lines
 
@@ -30,6 +30,9 @@ _STYLES = ("", "sphere", "granular")  # what may follow "Atoms #" in a data file
 
 # What a frame of a dump must hold; the first that occurs in a line names the item.
 _ITEMS = ("NUMBER OF ATOMS", "BOX BOUNDS", "ATOMS")
+
+# Units in a title without an equals sign: "units cgs", or "cgs units".
+_UNITS_IN_WORDS = re.compile(rf"(?i:\bunits:?\s+(?={'|'.join(UNITS)}\b)|\b(?=(?:si|cgs)\s+units\b))(\w+)")
 
 _COUNT = re.compile("[0-9]{1,15}")
 
@@ -62,7 +65,7 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     if options.columns or options.radius is not None:
         raise InputError(f"{path}: a LAMMPS data file has columns of its own. Drop columns and radius.")
     # Of the title, line 1, LAMMPS reads only the units that it may state.
-    title = re.search(r"\bunits\s*=\s*(\w+)", lines[0])
+    title = re.search(r"\bunits\s*=\s*(\w+)", lines[0]) or _UNITS_IN_WORDS.search(lines[0])
     number, corners = _data_header(path, texts[1:start])
     rows = Rows(path, texts[start + 1 :], first=start + 2)
     end = next((k for k, text in enumerate(rows.texts) if text[0].isalpha()), len(rows.texts))
@@ -77,10 +80,13 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     values, numbers = rows.columns({"id": 0, "x": 4, "y": 5, "z": 6, "diameter": 2}, cells)
     order = _by_id(path, values[:, 0], numbers)
     values = values[order]
+    notes = () if style else ("no style after Atoms, read as atom_style sphere",)
+    if cells == 7 and numbers[-1] == len(lines):
+        notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
     return FileContent(
         "LAMMPS data file, atom_style sphere", values[:, 1:4], values[:, 4] / 2, corners, "xlo xhi, ylo yhi, zlo zhi",
-        _unit(path, 1, title[1]) if title else None, numbers[order],
-        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"},
+        _unit(path, 1, title[1].lower()) if title else None, numbers[order],
+        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, notes=notes,
     )  # fmt: skip
 
 
@@ -136,10 +142,19 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     said = periodicity(f"{path}, line {line}", axes, lines[line - 1].removeprefix("ITEM:").strip(), options)
     start = frame.items["ATOMS"]
     rows = Rows(path, lines[start + 1 : frame.end], first=start + 2)
-    _check_number(path, _declared(path, lines, frame), len(rows.texts), rows.numbers[-1] if rows.numbers else start + 1)
+    declared = _declared(path, lines, frame)
+    if declared == 0:
+        choice = " Choose another as frame." if len(frames) > 1 else ""
+        raise InputError(
+            f"{path}, line {frame.items['NUMBER OF ATOMS'] + 2}: frame {chosen} of {len(frames)} (from 0) has no atoms."
+            f"{choice}"
+        )
+    _check_number(path, declared, len(rows.texts), rows.numbers[-1] if rows.numbers else start + 1)
     names = lines[start].split()[2:]
     columns, scaled = _dump_columns(path, start + 1, names, options)
     wanted = positions(columns)
+    if rows.numbers[-1] == len(lines) and len(names) - 1 in wanted.values():
+        notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
     if "id" in names:
         wanted["atom id"] = names.index("id")
     values, numbers = rows.columns(wanted, len(names))

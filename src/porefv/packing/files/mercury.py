@@ -59,6 +59,11 @@ def _frames(path: AnyPath, rows: Rows, whole_lines: bool) -> tuple[list[int], li
         words = rows.texts[row].split()
         if len(words) == 6 and _COUNT.fullmatch(words[0]):
             raise InputError(f"{path}, line {rows.numbers[row]}: the file is of two dimensions. Only spheres are read.")
+        if starts and len(words) > _HEADER:
+            raise InputError(
+                f"{path}, line {rows.numbers[row]}: a row of a sphere where the frame ends. Its header, line "
+                f"{rows.numbers[starts[-1]]}, declares {sizes[-1]} spheres. Correct this number, or remove the row."
+            )
         last = row == total - 1 and bool(starts)
         if not last and (len(words) != _HEADER or not _COUNT.fullmatch(words[0])):
             raise InputError(

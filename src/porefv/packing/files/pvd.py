@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from porefv.errors import InputError
 from porefv.packing.files import vtk
 from porefv.packing.files.content import FileContent
-from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.frames import chosen_frame, warn_cut_off
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, quoted, read_bytes
 
@@ -26,6 +26,23 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     if len({time for time, _ in times}) < len(times):
         raise InputError(f"{path}: the list has several files of the same time. Read one of these files instead.")
     chosen = chosen_frame(path, len(times), options)
+    try:
+        return _frame(path, times, chosen, options)
+    except InputError:
+        # A program that still writes, or was stopped, leaves the last file of the list cut off.
+        if options.frame is not None or chosen == 0 or not (Path(path).parent / times[chosen][1]).is_file():
+            raise
+        try:
+            found = _frame(path, times, chosen - 1, options)
+        except InputError:
+            found = None
+        if found is None:
+            raise
+    note = warn_cut_off(f"{path}: {quoted(times[chosen][1])}", chosen)
+    return replace(found, frames=chosen, notes=(*found.notes, note))
+
+
+def _frame(path: AnyPath, times: list[tuple[float, str]], chosen: int, options: ReadOptions) -> FileContent:
     file = Path(path).parent / times[chosen][1]
     if file.suffix.lower() not in (".vtp", ".vtu", ".vtk"):
         raise InputError(f"{path}: its frame {quoted(times[chosen][1])} is no .vtp, .vtu or .vtk file.")

@@ -15,20 +15,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import UNITS, Column, chosen_columns, positions, roles, spheres
+from porefv.packing.files.column_names import (
+    UNITS,
+    Column,
+    agreed_unit,
+    chosen_columns,
+    positions,
+    roles,
+    spheres,
+    units_below,
+)
 from porefv.packing.files.content import FileContent, LengthUnit, periodicity, warn_radius
-from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.frames import chosen_frame, warn_no_end
 from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.table_frames import keep_frame
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metadata, split, text_lines
 
 _DELIMITERS = (";", "\t", ",", None)
 _MOST_BEFORE = 100  # rows among which the header is looked for
+
+# A number with a decimal point or comma, and an exponent with E or, of Fortran, D.
+_WRITTEN_OTHERWISE = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eEdD][+-]?[0-9]+)?")
 
 _PERIODIC = "#PERIODIC::"  # after the # of a comment
 _SPHERE_PACK = "SpherePack text (x y z radius clump)"
@@ -52,25 +65,26 @@ class _Header:
 
 def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     """Read a table; errors name the file and the line."""
-    rows = Rows(path, text_lines(path, content))
+    all_lines = text_lines(path, content)
+    rows = Rows(path, all_lines)
     if not rows.texts:
         raise InputError(f"{path}: only comments. Give a header x,y,z,radius, then one sphere a line.")
-    chosen_frame(path, 1, options)
     header = _header(path, rows, options)
     cells = len(header.names)
     if header.line:
         columns = chosen_columns(path, header.line, header.names, options)
+        header, columns = _with_units(path, rows, header, columns)
+        frame, frames = keep_frame(path, rows, header.names, header.skip, header.delimiter, options)
         values, lines = _values(rows, columns, cells, header)
     else:
+        frame, frames = chosen_frame(path, 1, options), 1
         header, columns, values, lines = _without_names(path, rows, header, options)
     place = f"{path}, line {header.line}" if header.line else f"{path}"
     centres, radii, unit, names = spheres(place, columns, values, options)
-    stated = _unit_in_comments(path, rows)
-    if unit and stated and unit.metres != stated.metres and options.scale is None:
-        raise InputError(
-            f"{stated.place}: the unit is {quoted(stated.name)}, and the names of columns state {quoted(unit.name)}. "
-            "Give the length of the unit in m as scale."
-        )
+    unit = agreed_unit(unit, _unit_in_comments(path, rows), options)
+    # A last line of a comment, or in another frame, or whose last cell is not read, cannot lose digits that matter.
+    last_read = any(column.position == cells - 1 for column in columns)
+    notes = (warn_no_end(f"{path}, line {lines[-1]}"),) if last_read and lines[-1] == len(all_lines) else ()
     corners, metadata = read_metadata(path, rows.comments)
     box_place = "comments box_lower, box_upper"
     cell, said = _periodic_cell(path, rows, options)
@@ -82,12 +96,27 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         radii,
         corners,
         box_place,
-        unit or stated,
+        unit,
         lines,
         names,
+        frame,
+        frames,
         periodicity=said,
+        notes=notes,
         metadata=metadata,
     )
+
+
+def _with_units(path: AnyPath, rows: Rows, header: _Header, columns: list[Column]) -> tuple[_Header, list[Column]]:
+    """The header and the columns with the units that a row under the names may state."""
+    in_comment = header.skip == 0 or rows.numbers[header.skip - 1] != header.line
+    row = header.skip - (in_comment and header.skip > 0)  # a header in a comment skips all rows before the numbers
+    if row < len(rows.texts):
+        place = f"{path}, line {rows.numbers[row]}"
+        found = units_below(place, columns, split(rows.texts[row], header.delimiter))
+        if found is not None:
+            return replace(header, skip=row + 1), found
+    return header, columns
 
 
 def _values(rows: Rows, columns: list[Column], cells: int, header: _Header) -> tuple[NDArray, NDArray]:
@@ -127,6 +156,8 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
         return found[scores.index(max(scores))]
     if first == 0 or (first == 1 and _is_count(path, rows)):
         return _Header([str(k + 1) for k in range(cells)], 0, first, delimiter, "table without header")
+    if before and (what := _other_numbers(before[0])):
+        raise InputError(f"{path}, line {rows.numbers[0]}: {quoted(before[0])} has {what}.")
     last = len(before) - 1 if first else 0
     mark, names = next((mark, names) for mark, names in _cells_of_header(before[last]))
     return _Header(names, rows.numbers[last], last + 1, mark, _with_header(mark))
@@ -140,6 +171,19 @@ def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
             yield mark, re.findall(r"\S+(?:\s+[\[(][^\s\])]*[\])])?", text)
         elif mark in text:
             yield mark, [name.strip() for name in split(text, mark)]
+
+
+def _other_numbers(text: str) -> str:
+    """How a row of numbers is written that cannot be read; empty for any other row."""
+    for cells in (text.split(), text.split(";"), text.split("\t"), text.split(",")):
+        cells = [cell.strip() for cell in cells]
+        if len(cells) < 3 or not all(map(_WRITTEN_OTHERWISE.fullmatch, cells)):
+            continue
+        if any("," in cell for cell in cells):
+            return "decimal commas. Write decimals with a point"
+        if any("d" in cell.lower() for cell in cells):
+            return "exponents of Fortran with D. Write them with E, as in 1.0E-3"
+    return ""
 
 
 def _is_count(path: AnyPath, rows: Rows) -> bool:

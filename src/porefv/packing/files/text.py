@@ -163,6 +163,8 @@ class Rows:
             if not cell.strip():
                 raise InputError(f"{self.path}, line {line}: the cell of '{name}' is empty.") from None
             hint = " Write decimals with a point." if "," in cell else ""
+            if re.fullmatch(r"\s*[+-]?[0-9.]+[dD][+-]?[0-9]+\s*", cell):
+                hint = " Write exponents with E instead of D."
             raise InputError(f"{self.path}, line {line}: {name} is {quoted(cell)}, not a number.{hint}") from None
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from porefv.errors import InputError
+from porefv.packing.files.frames import warn_no_end
 from porefv.packing.files.text import AnyPath
 
 # Binary legacy files are big-endian.
@@ -97,9 +98,12 @@ def _numbers(path: AnyPath, content: bytes, name: str, keywords: re.Match[bytes]
         values = np.frombuffer(data, dtype, len(data) // dtype.itemsize).astype(np.float64)
     else:
         try:
-            values = np.array(content[keywords.end() :].split(None, size)[:size], dtype=np.float64)
+            words = content[keywords.end() :].split(None, size)
+            values = np.array(words[:size], dtype=np.float64)
         except ValueError as error:
             raise InputError(f"{path}: {name} is damaged: {error}.") from None
     if len(values) < size:
         raise InputError(f"{path}: {name} has {len(values)} numbers instead of {size}. Was the file cut off?")
+    if not binary and len(words) == size and not content[-1:].isspace():
+        warn_no_end(str(path))
     return values

@@ -11,13 +11,14 @@ import re
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import chosen_columns, positions, spheres
-from porefv.packing.files.content import FileContent, periodicity
-from porefv.packing.files.frames import chosen_frame, warn_cut_off
+from porefv.packing.files.column_names import UNITS, agreed_unit, chosen_columns, positions, spheres
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity
+from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, text_lines
 
 _COUNT = re.compile("[0-9]{1,15}")
+_UNIT_KEYS = ("units", "unit", "length_unit", "length_units")
 _KEYS = re.compile(r"(\w+)=(?:\"([^\"]*)\"|(\S+))")
 
 
@@ -38,6 +39,11 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         )
     values, numbers = rows.columns(positions(columns), len(names))
     centres, radii, unit, shown = spheres(place, columns, values, options)
+    stated = next((keys[key] for key in _UNIT_KEYS if key in keys), None)
+    if stated is not None:
+        unit = agreed_unit(unit, LengthUnit(stated, UNITS.get(stated.lower()), place), options)
+    if numbers[-1] == len(lines) and any(column.position == len(names) - 1 for column in columns):
+        notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
     axes = "".join(axis for axis, flag in zip("xyz", keys.get("pbc", "").split(), strict=False) if flag[0] in "T1t")
     if "lattice" in keys and "pbc" not in keys:
         notes = (*notes, "Lattice without pbc, read as a box with walls")
