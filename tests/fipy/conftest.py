@@ -1,5 +1,6 @@
 """What tests of FiPy share: the matrix that FiPy assembles."""
 
+import numpy as np
 import pytest
 import scipy.sparse as sp
 
@@ -16,6 +17,6 @@ def assembled():
         before = var.value.copy()
         equation.sweep(var=var, dt=dt, solver=fipy.DummySolver())
         var.setValue(before)
-        return sp.csr_array(equation.matrix.matrix), equation.RHSvector
+        return sp.csr_array(equation.matrix.matrix, copy=True), np.array(equation.RHSvector)
 
     return assemble

@@ -179,6 +179,7 @@ def any_velocity(fluid):
     return fipy.FaceVariable(mesh=fluid, rank=1, value=flux / fluid.scaledFaceAreas * fluid.faceNormals), flux
 
 
+@pytest.mark.filterwarnings("ignore:the variable has no condition:porefv.errors.TransportWarning")
 @pytest.mark.parametrize("scheme", FACE_PARTS)
 def test_convection_carries_the_flux(scheme, fluid, ends, assembled):
     pairs, inside = ends
@@ -195,6 +196,7 @@ def test_convection_carries_the_flux(scheme, fluid, ends, assembled):
     assert_array_equal(right, 0.0)
 
 
+@pytest.mark.filterwarnings("ignore:the variable has no condition:porefv.errors.TransportWarning")
 def test_explicit_upwind_convection_takes_the_old_values(fluid, ends, assembled):
     pairs, inside = ends
     velocity, flux = any_velocity(fluid)

@@ -6,9 +6,10 @@ Equations in FiPy then read as in a textbook, without factors of geometry in the
 
 from __future__ import annotations
 
+import warnings
+import weakref
 from collections.abc import Collection
 from functools import cached_property
-import warnings
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -16,8 +17,10 @@ import numpy as np
 from porefv.errors import InputError, OutOfRangeWarning, counted
 from porefv.fipy.faces import CLOSED, faces_of_cells, faces_of_fluid, walls_left_out
 from porefv.fipy.fipy_import import load_fipy
-from porefv.fipy.gradient_patch import patch_gradient
+from porefv.fipy.fipy_patches import install
 from porefv.fipy.gradient import gradient_operators
+from porefv.fipy.pore_solver import PoreSolver
+from porefv.fipy.term_checks import check_terms
 from porefv.mesh.polyhedra import polygons
 from porefv.packing.box import WALLS
 
@@ -117,12 +120,13 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     """
 
     def __init__(self, pore_mesh: PoreMesh, without: Collection[str] = ()):
-        patch_gradient()
+        install()
         left_out = walls_left_out(without)
         kept = (pore_mesh.pore_walls & sum(1 << wall for wall in left_out)) == 0
         if not kept.any():
             raise InputError("every pore is on a wall left out: nothing is left to solve for")
         self.pore_mesh = pore_mesh
+        self._checked: weakref.WeakSet[Any] = weakref.WeakSet()
         self.without = tuple(WALLS[wall] for wall in left_out)
         self.pores = np.flatnonzero(kept)
         self._given = given = faces_of_fluid(pore_mesh, kept, left_out)
@@ -368,6 +372,20 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
             )
             kept[counted] = gradient_operators(given.cells[rows], vectors, len(centres), rows, self._n_faces)
         return kept[counted]
+
+    # ---- what FiPy asks for an equation, once patched ---------------------------------------------------------------
+
+    @cached_property
+    def solver(self) -> PoreSolver:
+        """The solver of equations on this mesh for which no other is named: it keeps factors between solutions."""
+        return PoreSolver()
+
+    def solver_for(self, equation: Any, variable: Any, named: Any) -> Any:
+        """The solver named, or the mesh's own; the terms of an equation are looked at when it is first solved."""
+        if equation not in self._checked:
+            check_terms(equation, variable)
+            self._checked.add(equation)
+        return named or self.solver
 
     # ---- what FiPy's meshes of vertices can do -----------------------------------------------------------------------
 
