@@ -78,6 +78,39 @@ def test_the_velocity_is_free_of_divergence_but_for_sources(flow):
     assert_allclose(leaving, flow.flow_of_sources, atol=1e-12 * flow.inflow)
 
 
+def test_the_velocity_of_fipys_pressure_is_that_of_the_flow(flow):
+    fluid = flow.to_fipy()
+    fluid.solve(solver=direct())
+    v = fluid.velocity_with(fluid.mobility)
+    scale = np.abs(fluid.mesh.flux(fluid.velocity)).max()
+    assert_allclose(fluid.mesh.flux(v), fluid.mesh.flux(fluid.velocity), atol=1e-6 * scale)
+    assert_allclose(fluid.mesh.flux(fluid.velocity_with(0.5 * fluid.mobility)), 0.5 * fluid.mesh.flux(v), atol=1e-14 * scale)
+
+
+def test_a_viscosity_that_depends_on_the_solute_is_swept_to_rounding(mesh_of):
+    flow = PoreFlow(mesh_of("n54_s1"), Walls.along("y"))
+    fluid = flow.to_fipy()
+    c = fipy.CellVariable(mesh=fluid.mesh, hasOld=True)
+    c.constrain(1.0, where=fluid.inlet)
+    c.faceGrad.constrain(np.zeros((3, 1)), where=fluid.outlet)
+    mobility = fluid.mobility / (1.0 + 4.0 * c.faceValue)
+    v = fluid.velocity_with(mobility)
+    of_pressure = fipy.DiffusionTerm(coeff=mobility) == 0.0
+    of_solute = fipy.TransientTerm() + fipy.UpwindConvectionTerm(coeff=v) == 0.0
+    dt = 0.1 * fluid.mesh.cellVolumes.sum() / flow.inflow
+    changes = []
+    for _ in range(40):
+        before = c.value.copy()
+        of_pressure.solve(var=fluid.pressure)
+        of_solute.sweep(var=c, dt=dt)
+        changes.append(np.abs(c.value - before).max())
+    assert changes[-1] < 1e-12
+    stored = ((c.value - c.old.value) * fluid.mesh.cellVolumes).sum() / dt
+    passed = fluid.mesh.through(c.faceValue * v, fluid.mesh.exteriorFaces)
+    assert abs(stored + passed) < 1e-14 * flow.inflow
+    assert c.value.min() >= 0.0 and c.value.max() <= 1.0 + 1e-12
+
+
 def test_with_storage_the_pressure_settles_to_that_of_the_flow(mesh_of):
     flow = PoreFlow(mesh_of("n54_s1"), Walls.along("y"), tolerance=1e-13)
     fluid = flow.to_fipy()

@@ -128,11 +128,17 @@ class FlowProblem:
         """
         mesh, imposed = self.mesh, self.flow.imposed_pressures
         pressure = fipy.CellVariable(name="pressure", mesh=mesh, value=float(np.nanmean(imposed)))
-        held = mesh.exteriorFaces.value & np.isin(mesh.walls, np.flatnonzero(self.flow.walls_at_pressures.held))
+        held = self._held_faces
         values = np.zeros(mesh.numberOfFaces)
         values[held] = imposed[self._beyond[held]]
         pressure.constrain(fipy.FaceVariable(mesh=mesh, value=values), where=fipy.FaceVariable(mesh=mesh, value=held))
         return pressure
+
+    @cached_property
+    def _held_faces(self) -> np.ndarray:
+        """(f,) bool: exterior faces on walls that have a pressure."""
+        mesh = self.mesh
+        return mesh.exteriorFaces.value & np.isin(mesh.walls, np.flatnonzero(self.flow.walls_at_pressures.held))
 
     @cached_property
     def _beyond(self) -> np.ndarray:
@@ -156,6 +162,20 @@ class FlowProblem:
         imposed = fipy.CellVariable(mesh=mesh, value=np.nan_to_num(flow.imposed_pressures[mesh.pores]))
         return fipy.DiffusionTerm(coeff=self.mobility) - fipy.ImplicitSourceTerm(coeff=leak) == -sources - leak * imposed
 
+    def velocity_with(self, mobility: Any) -> Any:
+        """Velocity of `pressure` with a mobility, as a rank-1 `fipy.FaceVariable` that follows both [m/s].
+
+        For equations in which the mobility depends on what the fluid carries. -mobility · pressure.faceGrad is the same
+        but on walls of given pressure, where it is a difference of nearly equal pressures: here, what a pore on such a
+        wall gives to its neighbours comes through the wall. The fluid must not be compressible.
+
+        Parameters
+        ----------
+        mobility : FaceVariable
+            Such as `mobility` over a viscosity on faces [m²/(Pa s)].
+        """
+        return _VelocityOfPressure(self.pressure, mobility, self._held_faces)
+
     def solve(self, **options: object) -> np.ndarray:
         """Solve the pressure equation; the pressure of each pore, (n_pores,), those left out included [Pa].
 
@@ -168,3 +188,27 @@ class FlowProblem:
         found = self.flow.imposed_pressures.copy()
         found[self.mesh.pores] = self.pressure.value
         return found
+
+
+class _VelocityOfPressure(fipy.FaceVariable):  # type: ignore[name-defined]
+    """As `FlowProblem.velocity_with`."""
+
+    def __init__(self, pressure: Any, mobility: Any, held: np.ndarray):
+        super().__init__(mesh=pressure.mesh, rank=1, name="velocity")
+        self._pressure, self._mobility = self._requires(pressure), self._requires(mobility)
+        self._held = held
+
+    def _calcValue(self) -> np.ndarray:
+        mesh = self.mesh
+        areas = np.asarray(mesh._faceAreas)
+        first, second = np.asarray(mesh.faceCellIDs)
+        pressure, inside = self._pressure.numericValue, mesh.interiorFaces.value
+        beyond = np.where(inside, pressure[second], np.asarray(self._pressure.faceValue.numericValue))
+        conductance = self._mobility.numericValue * areas / mesh._cellDistances
+        flux = np.where(inside | self._held, conductance * (pressure[first] - beyond), 0.0)
+        given = np.bincount(first[inside], flux[inside], mesh.numberOfCells)
+        given -= np.bincount(second[inside], flux[inside], mesh.numberOfCells)
+        on_walls = np.flatnonzero(self._held & (mesh.throats < 0))
+        shares = areas[on_walls] / np.bincount(first[on_walls], areas[on_walls], mesh.numberOfCells)[first[on_walls]]
+        flux[on_walls] = -shares * given[first[on_walls]]
+        return flux / areas * mesh.faceNormals
