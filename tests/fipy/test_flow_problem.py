@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from porefv.conductance.registry import MODELS
 from porefv.flow.inside import FixedPressure, FlowSource
@@ -84,7 +84,9 @@ def test_the_velocity_of_fipys_pressure_is_that_of_the_flow(flow):
     v = fluid.velocity_with(fluid.mobility)
     scale = np.abs(fluid.mesh.flux(fluid.velocity)).max()
     assert_allclose(fluid.mesh.flux(v), fluid.mesh.flux(fluid.velocity), atol=1e-6 * scale)
-    assert_allclose(fluid.mesh.flux(fluid.velocity_with(0.5 * fluid.mobility)), 0.5 * fluid.mesh.flux(v), atol=1e-14 * scale)
+    assert_allclose(
+        fluid.mesh.flux(fluid.velocity_with(0.5 * fluid.mobility)), 0.5 * fluid.mesh.flux(v), atol=1e-14 * scale
+    )
 
 
 def test_a_viscosity_that_depends_on_the_solute_is_swept_to_rounding(mesh_of):

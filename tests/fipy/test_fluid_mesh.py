@@ -107,9 +107,10 @@ def test_what_cannot_be_made_is_refused(mesh_of):
     with pytest.raises(InputError, match="every pore is on a wall left out"):
         PoreMesh(Packing([[0.5, 0.5, 0.5]], [0.5], Box([0, 0, 0], [1, 1, 1]))).to_fipy(without=WALLS)
     fluid = mesh.to_fipy()
+    way = np.array([[1.0], [0.0], [0.0]])
     for attempt in (
-        lambda: fluid + [[1.0], [0.0], [0.0]], lambda: fluid + fluid, lambda: fluid * 2.0, lambda: 2.0 * fluid,
-        lambda: fluid / 2.0, lambda: fluid - [[1.0], [0.0], [0.0]],
+        lambda: fluid + way, lambda: way + fluid, lambda: fluid + fluid, lambda: fluid * 2.0, lambda: 2.0 * fluid,
+        lambda: fluid / 2.0, lambda: fluid - way,
     ):  # fmt: skip
         with pytest.raises(TypeError, match="cannot be moved, scaled or joined"):
             attempt()

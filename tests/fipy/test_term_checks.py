@@ -66,7 +66,9 @@ def test_a_tensor_is_warned_of(fluid, solute):
 
 
 def test_a_sound_equation_is_solved_without_a_word(fluid, solute):
-    equation = fipy.TransientTerm() + fipy.PowerLawConvectionTerm(coeff=fluid.velocity) == fipy.DiffusionTerm(coeff=1e-3)
+    equation = fipy.TransientTerm() + fipy.PowerLawConvectionTerm(coeff=fluid.velocity) == fipy.DiffusionTerm(
+        coeff=1e-3
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         equation.solve(var=solute, dt=0.1)

@@ -86,9 +86,7 @@ def _faces_of_throats(mesh: PoreMesh, cell_of_pore: np.ndarray, left_out: list[i
     found = found[np.argsort((cells[found] < 0).any(axis=1), kind="stable")]
     cells, pores = cells[found], throats.pores[found]
     lengths = throats.effective_lengths[found]
-    areas = np.maximum(
-        diffusive_conductances(throats)[found] * lengths, CLOSED * np.abs(throats.areas[found])
-    )
+    areas = np.maximum(diffusive_conductances(throats)[found] * lengths, CLOSED * np.abs(throats.areas[found]))
     ratios, normals = _ratios(mesh)[found], throats.normals[found].copy()
     # A face with one cell has it first.
     turned = np.flatnonzero(cells[:, 0] < 0)

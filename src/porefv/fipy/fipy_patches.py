@@ -1,11 +1,11 @@
 """What FiPy asks of a mesh only with a patch: the gradient of a variable, and the solver of an equation.
 
-FiPy's gradient is Gauss's: the sum of face values over the faces of a cell, over its volume. The faces of a pore's fluid
-do not enclose its volume, for grains are missing. FiPy's default solver measures its residual against a right-hand side
-that values on walls swell, and may leave a time step unsolved without a word.
+FiPy's gradient is Gauss's: the sum of face values over the faces of a cell, over its volume. The faces of a pore's
+fluid do not enclose its volume, for grains are missing. FiPy's default solver measures its residual against a
+right-hand side that values on walls swell, and may leave a time step unsolved without a word.
 
 Both patches put a question before what FiPy does: has the mesh an answer of its own? Meshes other than `FluidMesh` have
-none, and all stays as it was for them. `install` is called when the first `FluidMesh` is made; `remove` takes both back.
+none, and nothing changes for them. `install` is called when a `FluidMesh` is made; `remove` takes both back.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from fipy.variables.gaussCellGradVariable import _GaussCellGradVariable  # noqa:
 
 _SOLVER_PARAMETERS = ["self", "var", "solver", "args", "kwargs"]
 
-_gradient_of_fipy = getattr(_GaussCellGradVariable, "_calcValue", None)
-_solver_of_fipy = getattr(Term, "getDefaultSolver", None)
+_gradient_of_fipy: Any = getattr(_GaussCellGradVariable, "_calcValue", None)
+_solver_of_fipy: Any = getattr(Term, "getDefaultSolver", None)
 
 
 def _gradient(self: Any) -> Any:
@@ -50,7 +50,9 @@ def install() -> None:
     """
     known = _gradient_of_fipy is not None and _solver_of_fipy is not None
     if not known or list(inspect.signature(_solver_of_fipy).parameters) != _SOLVER_PARAMETERS:
-        raise ComputationError(f"porefv does not know FiPy {fipy.__version__}: install a version that its setup.cfg names")
+        raise ComputationError(
+            f"porefv does not know FiPy {fipy.__version__}: install a version that its setup.cfg names"
+        )
     _GaussCellGradVariable._calcValue = _gradient
     Term.getDefaultSolver = _solver
 

@@ -62,7 +62,9 @@ class FlowProblem:
         throats = mesh.throats >= 0
         found = np.zeros(mesh.numberOfFaces)
         # A face towards a pore left out may have been turned.
-        sense = np.where(mesh.pores[mesh.faceCellIDs[0][throats]] == flow.mesh.throats.pores[mesh.throats[throats], 0], 1.0, -1.0)
+        sense = np.where(
+            mesh.pores[mesh.faceCellIDs[0][throats]] == flow.mesh.throats.pores[mesh.throats[throats], 0], 1.0, -1.0
+        )
         found[throats] = sense * flow.flux[mesh.throats[throats]]
         faces = flow.mesh.wall_faces
         entering = np.zeros((flow.mesh.n_pores, 6))
@@ -118,7 +120,7 @@ class FlowProblem:
     def _conductance_of_pores(self) -> np.ndarray:
         """(n_pores,): sum over the throats of each pore [m³/(Pa s)]."""
         mesh, conductances = self.flow.mesh, self._open_conductances
-        return sum(np.bincount(end, conductances, mesh.n_pores) for end in mesh.throats.pores.T)
+        return np.bincount(mesh.throats.pores.ravel(), np.repeat(conductances, 2), mesh.n_pores)
 
     @cached_property
     def pressure(self) -> Any:
@@ -160,7 +162,9 @@ class FlowProblem:
         leak = np.where(fixed, AT_WALLS * self._conductance_of_pores[mesh.pores] / mesh.cellVolumes, 0.0)
         leak = fipy.CellVariable(mesh=mesh, value=leak)
         imposed = fipy.CellVariable(mesh=mesh, value=np.nan_to_num(flow.imposed_pressures[mesh.pores]))
-        return fipy.DiffusionTerm(coeff=self.mobility) - fipy.ImplicitSourceTerm(coeff=leak) == -sources - leak * imposed
+        return (
+            fipy.DiffusionTerm(coeff=self.mobility) - fipy.ImplicitSourceTerm(coeff=leak) == -sources - leak * imposed
+        )
 
     def velocity_with(self, mobility: Any) -> Any:
         """Velocity of `pressure` with a mobility, as a rank-1 `fipy.FaceVariable` that follows both [m/s].

@@ -62,11 +62,12 @@ class _Recipe(fipy.meshes.representations.abstractRepresentation._AbstractRepres
 
 
 class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
-    """The fluid in the pores as a FiPy mesh: `TransientTerm() + PowerLawConvectionTerm(u) == DiffusionTerm(D)` is right.
+    """The fluid in the pores as a FiPy mesh, on which equations are written as in a textbook.
 
-    A cell is a pore with its void as volume and its Laguerre vertex as centre. Faces are throats, one each, and one
-    for each pore and wall that it touches. A throat's face has the area A = g L of its diffusive section and the
-    distance L, so that DiffusionTerm(D) passes D g (c_1 - c_2) (`porefv.conductance.prism_sections`).
+    `TransientTerm() + PowerLawConvectionTerm(coeff=u) == DiffusionTerm(coeff=D)` is right as it stands. A cell is a
+    pore with its void as volume and its Laguerre vertex as centre. Faces are throats, one each, and one for each pore and
+    wall that it touches. A throat's face has the area A = g L of its diffusive section and the distance L, so that
+    DiffusionTerm(D) passes D g (c_1 - c_2) (`porefv.conductance.prism_sections`).
 
     Parameters
     ----------
@@ -256,12 +257,12 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         return points.T, np.ma.masked_values(corners.T, -1)
 
     @property
-    def vertexCoords(self) -> np.ndarray:  # noqa: N802  # FiPy's name
+    def vertexCoords(self) -> np.ndarray:  # FiPy's name
         """(3, v): corners of the faces' polygons [m]; a throat of several facets has its first one's."""
         return self._polygons[0]
 
     @property
-    def faceVertexIDs(self) -> Any:  # noqa: N802  # FiPy's name
+    def faceVertexIDs(self) -> Any:  # FiPy's name
         """(4, f) masked: corners of each face."""
         return self._polygons[1]
 
@@ -272,36 +273,36 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         return fipy.FaceVariable(mesh=self, value=np.isin(self.walls, walls_left_out(names)))
 
     @property
-    def facesLeft(self) -> Any:  # noqa: N802
+    def facesLeft(self) -> Any:
         """Faces on x_min."""
         return self.on_wall("x_min")
 
     @property
-    def facesRight(self) -> Any:  # noqa: N802
+    def facesRight(self) -> Any:
         """Faces on x_max."""
         return self.on_wall("x_max")
 
     @property
-    def facesBottom(self) -> Any:  # noqa: N802
+    def facesBottom(self) -> Any:
         """Faces on y_min."""
         return self.on_wall("y_min")
 
-    facesDown = facesBottom  # noqa: N815
+    facesDown = facesBottom
 
     @property
-    def facesTop(self) -> Any:  # noqa: N802
+    def facesTop(self) -> Any:
         """Faces on y_max."""
         return self.on_wall("y_max")
 
-    facesUp = facesTop  # noqa: N815
+    facesUp = facesTop
 
     @property
-    def facesFront(self) -> Any:  # noqa: N802
+    def facesFront(self) -> Any:
         """Faces on z_min."""
         return self.on_wall("z_min")
 
     @property
-    def facesBack(self) -> Any:  # noqa: N802
+    def facesBack(self) -> Any:
         """Faces on z_max."""
         return self.on_wall("z_max")
 
@@ -326,8 +327,8 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         below = int(np.count_nonzero(surfaces < 0.0))
         if below:
             warnings.warn(
-                f"{counted(below, 'pore')} of {len(surfaces)} would have a surface below zero, for spheres overlap much: "
-                "their specific surface is zero, and the sum over all pores is too large",
+                f"{counted(below, 'pore')} of {len(surfaces)} would have a surface below zero, for spheres overlap "
+                "much: their specific surface is zero, and the sum over all pores is too large",
                 OutOfRangeWarning, stacklevel=2,
             )  # fmt: skip
         return fipy.CellVariable(mesh=self, value=np.maximum(surfaces, 0.0) / self._void, name="specific surface")

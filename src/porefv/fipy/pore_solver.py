@@ -7,7 +7,6 @@ what passes through them, and has an error where that is not small.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -37,6 +36,7 @@ ROUNDING = 1e-14
 KEPT = 4
 _EPSILON = float(np.finfo(float).eps)
 _RESTARTS = 20
+_CORRECTIONS = 5
 
 
 class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[name-defined]
@@ -79,7 +79,7 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
         super().__init__(tolerance=tolerance, iterations=iterations, criterion="unscaled", precon=None)
         self._kept: list[tuple[Any, _Symmetric | _General]] = []
 
-    def _solve_(self, L: Any, x: np.ndarray, b: np.ndarray) -> np.ndarray:  # noqa: N803  # FiPy's names
+    def _solve_(self, L: Any, x: np.ndarray, b: np.ndarray) -> np.ndarray:  # FiPy's names
         matrix = sp.csr_array(L)
         ready = self._factored(matrix)
         x = np.ascontiguousarray(x, float)
@@ -199,8 +199,8 @@ class _General:
         empty = np.flatnonzero(self._sizes.sum(axis=1) == 0.0)
         if len(empty):
             raise ComputationError(
-                f"nothing determines {counted(len(empty), 'unknown')} of {matrix.shape[0]}, the first of them {empty[0]}: "
-                "its row of the matrix is empty"
+                f"nothing determines {counted(len(empty), 'unknown')} of {matrix.shape[0]}, the first of them "
+                f"{empty[0]}: its row of the matrix is empty"
             )
         self._direct = matrix.shape[0] <= FACTOR_LIMIT
 
@@ -240,8 +240,9 @@ class _General:
 
     def _refine(self, b: np.ndarray, x: np.ndarray, tolerance: float, factor: SuperLU) -> tuple[np.ndarray, int]:
         """Corrections by a factor until the tolerance is met, or rounding allows no more; at least one."""
-        best, least = x, np.inf
-        for count in range(1, 6):
+        best, least, count = x, np.inf, 0
+        while count < _CORRECTIONS:
+            count += 1
             x = x + factor.solve(b - self._matrix @ x)
             lost = float(np.abs(b - self._matrix @ x).sum())
             if not lost < 0.5 * least:

@@ -68,8 +68,8 @@ def _check_convection(term: Any, variable: Any) -> None:
     velocity = term.coeff
     if not isinstance(velocity, fipy.FaceVariable) or isinstance(velocity, _CellToFaceVariable):
         warnings.warn(
-            f"the velocity of a {name} is not given on faces: what is uniform, or interpolated from pores, is not free of "
-            "divergence where grains are in its way. Take flow.to_fipy().velocity",
+            f"the velocity of a {name} is not given on faces: what is uniform, or interpolated from pores, is not "
+            "free of divergence where grains are in its way. Take flow.to_fipy().velocity",
             TransportWarning, stacklevel=_CALLER,
         )  # fmt: skip
         return
@@ -80,9 +80,9 @@ def _check_convection(term: Any, variable: Any) -> None:
     open_ = passed & ~value & ~slope
     if open_.any():
         warnings.warn(
-            f"{variable.name or 'the variable'} has no condition on {counted(int(open_.sum()), 'face')} that fluid passes: "
-            "nothing is carried through them. Constrain its value where fluid enters, and its faceGrad, to zero, where "
-            "it leaves",
+            f"{variable.name or 'the variable'} has no condition on {counted(int(open_.sum()), 'face')} that fluid "
+            "passes: nothing is carried through them. Constrain its value where fluid enters, and its faceGrad, to "
+            "zero, where it leaves",
             TransportWarning, stacklevel=_CALLER,
         )  # fmt: skip
     if isinstance(term, fipy.CentralDifferenceConvectionTerm) and (passed & value).any():
@@ -95,11 +95,13 @@ def _check_convection(term: Any, variable: Any) -> None:
 
 def _check_diffusion(term: Any, variable: Any) -> None:
     coefficient = getattr(term, "nthCoeff", None)
-    rank = coefficient.rank if isinstance(coefficient, fipy.FaceVariable) else np.ndim(getattr(coefficient, "value", 0.0))
+    rank = (
+        coefficient.rank if isinstance(coefficient, fipy.FaceVariable) else np.ndim(getattr(coefficient, "value", 0.0))
+    )
     if variable.rank == 0 and rank > 0:
         warnings.warn(
-            "the coefficient of a DiffusionTerm is a vector or a tensor: what it carries along the faces of pores means "
-            "nothing. Give a number for each face, n·D·n",
+            "the coefficient of a DiffusionTerm is a vector or a tensor: what it carries along the faces of pores "
+            "means nothing. Give a number for each face, n·D·n",
             TransportWarning, stacklevel=_CALLER,
         )  # fmt: skip
 
@@ -107,5 +109,5 @@ def _check_diffusion(term: Any, variable: Any) -> None:
 def _mask(field: Any) -> np.ndarray:
     """(f,) bool: faces on which a field is constrained, in all components."""
     mask = field.constraintMask
-    values = np.asarray(mask.value if hasattr(mask, "value") else mask, bool)
-    return values.reshape(-1, values.shape[-1]).all(axis=0) if values.ndim > 1 else values
+    values: np.ndarray = np.asarray(mask.value if hasattr(mask, "value") else mask, bool)
+    return np.all(values.reshape(-1, values.shape[-1]), axis=0)

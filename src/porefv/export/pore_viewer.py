@@ -46,7 +46,7 @@ class PoreViewer(fipy.viewers.viewer.AbstractViewer):  # type: ignore[name-defin
     >>> PoreViewer(vars=height).plot("height.vtu")
     """
 
-    def __init__(self, vars: Any, title: str | None = None, **limits: float):  # noqa: A002  # FiPy's name
+    def __init__(self, vars: Any, title: str | None = None, **limits: float):
         super().__init__(vars, title=title, **limits)
         meshes = {id(var.mesh): var.mesh for var in self.vars}
         if len(meshes) != 1 or not isinstance(self.vars[0].mesh, FluidMesh):

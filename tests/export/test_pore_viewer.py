@@ -8,7 +8,7 @@ from porefv.errors import InputError
 
 fipy = pytest.importorskip("fipy")
 pyvista = pytest.importorskip("pyvista")
-viewer = pytest.importorskip("porefv.fipy.viewer")
+viewer = pytest.importorskip("porefv.export.pore_viewer")
 
 
 @pytest.mark.parametrize("without", [(), ("y_min",)], ids=["all pores", "without a wall"])
