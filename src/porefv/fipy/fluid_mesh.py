@@ -65,8 +65,8 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     """The fluid in the pores as a FiPy mesh, on which equations are written as in a textbook.
 
     `TransientTerm() + PowerLawConvectionTerm(coeff=u) == DiffusionTerm(coeff=D)` is right as it stands. A cell is a
-    pore with its void as volume and its Laguerre vertex as centre. Faces are throats, one each, and one for each pore and
-    wall that it touches. A throat's face has the area A = g L of its diffusive section and the distance L, so that
+    pore with its void as volume and its Laguerre vertex as centre. Faces are throats, one each, and one for each pore
+    and wall that it touches. A throat's face has the area A = g L of its diffusive section and the distance L, so that
     DiffusionTerm(D) passes D g (c_1 - c_2) (`porefv.conductance.prism_sections`).
 
     Parameters
