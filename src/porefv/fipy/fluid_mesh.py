@@ -18,7 +18,7 @@ from porefv.errors import InputError, OutOfRangeWarning, counted
 from porefv.fipy.faces import CLOSED, faces_of_cells, faces_of_fluid, walls_left_out
 from porefv.fipy.fipy_import import load_fipy
 from porefv.fipy.fipy_patches import install
-from porefv.fipy.gradient import gradient_operators
+from porefv.fipy.gradient import LeastSquaresGradient
 from porefv.fipy.pore_solver import PoreSolver
 from porefv.fipy.term_checks import check_terms
 from porefv.mesh.polyhedra import polygons
@@ -127,6 +127,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         if not kept.any():
             raise InputError("every pore is on a wall left out: nothing is left to solve for")
         self.pore_mesh = pore_mesh
+        self._gradients: dict[bytes, LeastSquaresGradient] = {}
         self._checked: weakref.WeakSet[Any] = weakref.WeakSet()
         self.without = tuple(WALLS[wall] for wall in left_out)
         self.pores = np.flatnonzero(kept)
@@ -338,41 +339,28 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
 
         It is what `variable.grad` gives. Values that are given on faces towards pores left out count as neighbours.
         """
-        value = np.asarray(variable.numericValue if hasattr(variable, "numericValue") else variable, float)
-        outer = self._given.throats >= 0
-        outer &= self._given.cells[:, 1] < 0
-        faces = None
-        if outer.any() and hasattr(variable, "arithmeticFaceValue"):
+        value = np.asarray(variable.numericValue, float)
+        on_faces = np.asarray(variable.arithmeticFaceValue.numericValue)[..., : self._n_faces]
+        outer = (self._given.throats >= 0) & (self._given.cells[:, 1] < 0)
+        if outer.any():
             mask = variable.arithmeticFaceValue.constraintMask
-            constrained = np.asarray(mask.value if hasattr(mask, "value") else mask, bool)
-            constrained = np.broadcast_to(constrained, (*value.shape[:-1], self.numberOfFaces))
-            outer &= constrained.reshape(-1, self.numberOfFaces)[:, :-1].all(axis=0)
-            faces = np.asarray(variable.arithmeticFaceValue.numericValue)[..., :-1]
-        else:
-            outer[:] = False
-        operators = self._operators(outer.tobytes())
-        known = np.zeros((*value.shape[:-1], len(self.pores) + self._n_faces))
-        known[..., : len(self.pores)] = value
-        if faces is not None:
-            known[..., len(self.pores) :][..., outer] = faces[..., outer]
-        flat = known.reshape(-1, known.shape[-1])
-        return np.stack([(operator @ flat.T).T.reshape(value.shape) for operator in operators])
+            given = np.asarray(mask.value if hasattr(mask, "value") else mask, bool)
+            given = np.broadcast_to(given, (*value.shape[:-1], self.numberOfFaces)).reshape(-1, self.numberOfFaces)
+            outer &= given[:, : self._n_faces].all(axis=0)
+        return self._least_squares(outer.tobytes()).of(value, on_faces)
 
-    def _operators(self, counted: bytes) -> list[Any]:
-        """Operators of the gradient with these faces (f,) bool, as bytes, as neighbours besides the cells."""
-        kept = self.__dict__.setdefault("_gradient_operators", {})
-        if counted not in kept:
-            given = self._given
+    def _least_squares(self, outer: bytes) -> LeastSquaresGradient:
+        """The gradient with these faces (f,) bool, as bytes, for neighbours besides the cells."""
+        if outer not in self._gradients:
+            given, centres = self._given, self.pore_mesh.pore_points[self.pores]
             both = given.cells[:, 1] >= 0
-            rows = np.flatnonzero(both | np.frombuffer(counted, bool))
-            centres = self.pore_mesh.pore_points[self.pores]
-            vectors = np.where(
-                both[rows, None],
-                centres[given.cells[rows, 1]] - centres[given.cells[rows, 0]],
-                given.distances[rows, None] * given.normals[rows],
+            faces = np.flatnonzero(both | np.frombuffer(outer, bool))
+            first, second = given.cells[faces].T
+            ways = np.where(
+                both[faces, None], centres[second] - centres[first], given.distances[faces, None] * given.normals[faces]
             )
-            kept[counted] = gradient_operators(given.cells[rows], vectors, len(centres), rows, self._n_faces)
-        return kept[counted]
+            self._gradients[outer] = LeastSquaresGradient(given.cells[faces], ways, len(centres), faces)
+        return self._gradients[outer]
 
     # ---- what FiPy asks for an equation, once patched ---------------------------------------------------------------
 
