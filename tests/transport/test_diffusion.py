@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from porefv.conductance.prism_sections import diffusive_conductances
 from porefv.errors import InputError
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
@@ -114,7 +115,17 @@ def test_a_sample_that_is_one_pore_thin_is_refused():
 
 
 def test_wrong_arguments_are_refused(mesh_of):
+    mesh = mesh_of("n25_s1")
     with pytest.raises(InputError, match="axis must be 'x', 'y' or 'z'"):
         effective_diffusion(mesh_of("n25_s1"), "w")
     with pytest.raises(InputError, match="mesh must be a PoreMesh"):
         effective_diffusion(mesh_of("n25_s1").packing, "x")
+    with pytest.raises(InputError, match="conductances must be finite and not negative: 1 throat"):
+        effective_diffusion(mesh, "x", conductances=np.where(np.arange(len(mesh.throats)) == 7, -1.0, 1.0))
+
+
+def test_it_is_in_proportion_to_given_conductances(mesh_of):
+    mesh = mesh_of("n25_s1")
+    found = effective_diffusion(mesh, "x")
+    doubled = effective_diffusion(mesh, "x", conductances=2.0 * diffusive_conductances(mesh.throats))
+    assert_allclose(doubled.relative_diffusivity, 2.0 * found.relative_diffusivity, rtol=1e-9)

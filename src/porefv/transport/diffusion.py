@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from porefv.conductance.conductances import ensure_pore_mesh
+from porefv.conductance.conductances import check_conductances, ensure_pore_mesh
 from porefv.conductance.prism_sections import diffusive_conductances
 from porefv.errors import InputError
+from porefv.flow.flux import net_outflows
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.pressure_equation import reached, solve_network
 from porefv.solvers.solver import TOLERANCE
@@ -52,7 +54,12 @@ class EffectiveDiffusion:
 
 
 def effective_diffusion(
-    mesh: PoreMesh, axis: str, *, solver: str = "auto", tolerance: float = TOLERANCE
+    mesh: PoreMesh,
+    axis: str,
+    *,
+    conductances: ArrayLike | None = None,
+    solver: str = "auto",
+    tolerance: float = TOLERANCE,
 ) -> EffectiveDiffusion:
     """Diffusion between the two walls across an axis, held at concentrations 1 and 0; nothing passes the other walls.
 
@@ -62,13 +69,16 @@ def effective_diffusion(
     ----------
     mesh : PoreMesh
     axis : {"x", "y", "z"}
+    conductances : (t,) array, optional
+        g of each throat, which passes D g (c_i - c_j); by default `diffusive_conductances(mesh.throats)` [m].
     solver, tolerance
         See `porefv.solvers.solver.Solver`.
 
     Raises
     ------
     InputError
-        If the axis is unknown, or a pore touches both walls: the sample is too thin.
+        If the axis is unknown, or a pore touches both walls: the sample is too thin. If conductances are negative or
+        not finite.
     ComputationError
         If the solver fails.
 
@@ -91,15 +101,14 @@ def effective_diffusion(
             f"pore {pore} touches both {axis}_min and {axis}_max: nothing is left between the two walls to diffuse "
             "through. Choose another axis, or a packing with more spheres between the walls"
         )
-    pairs, conductances = mesh.throats.pores, diffusive_conductances(mesh.throats)
+    given = diffusive_conductances(mesh.throats) if conductances is None else conductances
+    pairs, passes = mesh.throats.pores, check_conductances(mesh, given, "m")
     held = np.select([enters, leaves], [1.0, 0.0], np.nan)
-    found = solve_network(pairs, conductances, held, solver=solver, tolerance=tolerance)
-    if not reached(pairs, conductances, enters)[leaves].any():
-        relative = 0.0
-    else:
+    found = solve_network(pairs, passes, held, solver=solver, tolerance=tolerance)
+    relative = 0.0
+    if reached(pairs, passes, enters)[leaves].any():
         i, j = pairs.T
         drops = (found.pressure[i] - found.pressure[j]) + (found.rest[i] - found.rest[j])
-        passing = (conductances * drops)[enters[i] & ~enters[j]].sum()
-        passing -= (conductances * drops)[enters[j] & ~enters[i]].sum()
+        passing = net_outflows(mesh, passes * drops)[enters].sum()
         relative = float(passing * mesh.box.size[number] / mesh.box.section(number))
     return EffectiveDiffusion(axis, relative, mesh.packing.porosity, found.pressure)
