@@ -93,6 +93,10 @@ class FreeSpaceWarning(PorefvWarning):
     """There is more room between a wall and the grains than between grains."""
 
 
+class NoOpenPathWarning(PorefvWarning):
+    """No open path leads from the inlet of a sample to its outlet: no fluid passes."""
+
+
 class OutOfRangeWarning(PorefvWarning):
     """Much of a flow is in throats of a kind that the conductance model was not tested on."""
 

@@ -332,3 +332,24 @@ def test_bounding_box_holds_every_sphere_with_few_digits():
         extent = (packing.centres + packing.radii[:, None]).max(axis=0)
         np.testing.assert_allclose(box.upper, extent, atol=2e-5 * scale)
     np.testing.assert_allclose(Packing([[0.5, 0.5, 0.5]], [0.4]).bounding_box.upper, 0.9, rtol=1e-15)
+
+
+@given(st.integers(0, 10_000))
+def test_any_cropped_packing_is_accepted_with_a_wall_tolerance_of_one(reference, seed):
+    rng = np.random.default_rng(seed)
+    packing = reference("n200_s1")
+    lower = rng.uniform(0.0, 0.6, 3)
+    # A wall that all but touches a centre: the sphere reaches beyond it by its radius, but for rounding.
+    lower[0] = np.nextafter(packing.centres[rng.integers(len(packing)), 0], -1.0)
+    box = Box(lower, lower + rng.uniform(0.35, 0.4, 3))
+    if (box.wall_distances(packing.centres) > 0.0).all(axis=1).any():
+        assert packing.cropped(box).validate(wall_tolerance=1.0).porosity > 0.0
+
+
+def test_a_cropped_packing_with_a_centre_beside_a_wall_needs_more_than_nearly_one(reference):
+    packing = reference("n200_s1")
+    lower = np.append(packing.centres[0, :2] - 0.2, packing.centres[0, 2] - 1e-6)
+    cropped = packing.cropped(Box(lower, lower + 0.4))
+    with pytest.raises(InputError, match="reaches beyond a wall by more than 0.99 of its radius"):
+        cropped.validate(wall_tolerance=0.99)
+    cropped.validate(wall_tolerance=1.0)

@@ -60,6 +60,10 @@ def test_scenes_of_the_project_are_sound(path):
     assert len(FlowScene.read(path).check()) > 0
 
 
+def test_a_wall_tolerance_of_one_which_any_cropped_packing_needs_is_accepted():
+    assert FlowScene.from_mapping(mapping(mesh={"wall_tolerance": 1.0}), DATA / "packings").mesh.wall_tolerance == 1.0
+
+
 def test_every_key_is_understood():
     scene = FlowScene.read(DATA / "scenes" / "n25.toml")
     assert scene.packing.format == "csv"
@@ -238,6 +242,7 @@ BAD = {
     ),
     "tolerance": ("[flow]", "[flow]\ntolerance = 0.0", "tolerance: must lie between 0 and 1"),
     "unite_tolerance": ("[flow]", "[mesh]\nunite_tolerance = -0.1\n[flow]", "must lie in .0, 1"),
+    "wall_tolerance": ("[flow]", "[mesh]\nwall_tolerance = 1.1\n[flow]", "must lie in .0, 1."),
     "flat box": ("[flow]", "[box]\nlower = [0, 0, 0]\nupper = [0, 1, 1]\n[flow]", "line 9: .box. .* 0 m"),
     "half a box": ("[flow]", "[box]\nlower = [0, 0, 0]\n[flow]", "line 7: .box. upper: missing"),
     "unknown format": ("packing =", "[packing]\nformat = 'cvs'\nfile =", "line 2: .packing. format: .* mean 'csv'"),

@@ -147,3 +147,23 @@ def test_a_source_in_an_isolated_pore_is_an_error():
     pairs = np.array([[0, 1], [1, 2]])
     with pytest.raises(ComputationError, match="pore 2 has a source"):
         solve_network(pairs, np.array([1.0, 0.0]), np.array([1.0, NAN, NAN]), sources=np.array([0.0, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize("solver", METHODS)
+def test_parts_that_no_path_joins_have_their_imposed_pressures_exactly(solver):
+    # Two parts with conductances many decades apart, and a pore in neither.
+    pairs = np.array([[0, 1], [1, 2], [0, 2], [3, 4], [4, 5], [2, 6], [6, 3]])
+    k = np.array([1e-9, 3.7, 1.3e5, 0.7, 2.9e-12, 0.0, 0.0])
+    fixed = np.array([0.3, NAN, NAN, NAN, NAN, 0.1, NAN])
+    solution = solve_network(pairs, k, fixed, solver=solver)
+    assert solution.pressure[:6].tolist() == [0.3] * 3 + [0.1] * 3 and not solution.rest[:6].any()
+    assert solution.isolated.tolist() == [False] * 6 + [True] and 0.1 < solution.pressure[6] < 0.3
+
+
+@pytest.mark.parametrize("solver", METHODS)
+def test_a_source_raises_the_pressure_of_its_own_part_alone(solver):
+    pairs, k = np.array([[0, 1], [1, 2], [3, 4]]), np.array([2.0, 1.0, 1.0])
+    sources = np.array([0.0, 0.0, 4.0, 0.0, 0.0])
+    solution = solve_network(pairs, k, np.array([1.0, NAN, NAN, 0.0, NAN]), sources=sources, solver=solver)
+    assert_allclose(solution.pressure, [1.0, 3.0, 7.0, 0.0, 0.0], rtol=1e-12)
+    assert solution.pressure[4] == 0.0

@@ -39,7 +39,7 @@ def check(done, reason):
 
 
 def kept(folder):
-    return sorted((folder / kernel_files.KEPT).glob("solvers.pressure_equation.*reached-*"))
+    return sorted((folder / kernel_files.KEPT).glob("solvers.pressure_equation.*joined_parts-*"))
 
 
 # ---- where they are kept ----------

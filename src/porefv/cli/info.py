@@ -155,13 +155,15 @@ def _axes_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return [*rows, ("walls beside the flow", "slip" if found["slip"] else "no-slip")]
 
 
-def _outside(found: Mapping[str, float] | None) -> str | None:
+def _outside(found: Mapping[str, Any] | None) -> str | None:
     """How much of the flow is where the model was not tested, if that is worth a word."""
     if found is None or found["outside"] < 0.01:
         return None
-    parts = {name.replace("_", " "): part for name, part in found.items() if name != "outside" and part >= 0.01}
+    parts = {
+        name.replace("_", " "): part for name, part in found.items() if name not in ("outside", "of") and part >= 0.01
+    }
     kinds = ", ".join(f"{name} {100 * part:.0f} %" for name, part in parts.items())
-    return f"{100 * found['outside']:.0f} % of the dissipation ({kinds})"
+    return f"{100 * found['outside']:.0f} % of the {found.get('of', 'dissipation')} ({kinds})"
 
 
 def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,10 @@ import numpy as np
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
-from porefv.errors import InputError
+from porefv.errors import InputError, NoOpenPathWarning
 from porefv.flow.fluid import Fluid
 from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes, wall_fluxes
+from porefv.flow.open_path import has_open_path, no_open_path_text
 from porefv.flow.pressure import solve_pressure
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
@@ -66,6 +68,11 @@ def directional_permeabilities(
     InputError, ComputationError
         As of `PoreFlow`.
 
+    Warns
+    -----
+    NoOpenPathWarning
+        If there are axes along which no open path leads through the packing. These permeabilities are 0.
+
     Examples
     --------
     >>> mesh = PoreMesh(Packing.read("data/packings/n25_s1.csv"))
@@ -76,16 +83,23 @@ def directional_permeabilities(
     fluid = fluid if fluid is not None else Fluid()
     model = ensure_model(conductance) if conductance is not None else AUTO()
     found, conductances, walls_before = [], np.empty(0), None
+    closed: list[str] = []
+    text = ""
     for axis, name in enumerate("xyz"):
         walls = Walls.along(name, slip=slip)
         if walls_before is None or (walls.slip != walls_before.slip).any():
             conductances = throat_conductances(mesh, model, walls.slip, fluid.viscosity)
         walls_before = walls
+        if not has_open_path(mesh, conductances, walls):
+            closed.append(name)
+            text = no_open_path_text(mesh, conductances, f"along {', '.join(closed)}")
         field = solve_pressure(mesh, conductances, walls, solver=solver, tolerance=tolerance)
         outflows = net_outflows(mesh, fluxes(mesh, conductances, field))
         through = wall_fluxes(mesh, wall_face_fluxes(mesh, outflows, walls.held))[2 * axis : 2 * axis + 2]
         flux = 0.5 * (max(through[0], 0.0) + max(-through[1], 0.0))
         found.append(float(fluid.viscosity * flux * mesh.box.size[axis] / mesh.box.section(axis)))
+    if closed:
+        warnings.warn(text, NoOpenPathWarning, stacklevel=2)
     x, y, z = found
     return DirectionalPermeabilities(x, y, z, bool(slip))
 

@@ -70,5 +70,5 @@ def of_cells(
     places = np.column_stack([mesh.vertices[chosen] - mesh.vertices[chosen].mean(axis=0), np.ones(cells)])
     relative = pressure[pores] - pressure[pores].mean()
     gradient = np.linalg.lstsq(weight[:, None] * places, weight * relative, rcond=None)[0][axis]
-    permeability = float(-viscosity * flux / gradient) if gradient != 0.0 else float("nan")
+    permeability = float(viscosity * flux / -gradient) if gradient != 0.0 else float("nan")
     return Interior(float(voids.sum() / volumes.sum()), permeability, cells)

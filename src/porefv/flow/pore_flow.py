@@ -7,6 +7,7 @@ The functions that it calls can be used without it: `throat_conductances`, `solv
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Collection, Sequence
 from types import NoneType
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ import numpy as np
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
-from porefv.errors import InputError, counted
+from porefv.errors import InputError, NoOpenPathWarning, counted
 from porefv.flow.fluid import Fluid
 from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes, wall_fluxes
 from porefv.flow.forces import Forces, grain_forces
@@ -24,6 +25,7 @@ from porefv.flow.given_pressure import given_pressure
 from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
 from porefv.flow.inside import FixedPressure, FlowSource, ImposedInside, check_imposed, imposed_inside
 from porefv.flow.interior import Interior, interior
+from porefv.flow.open_path import has_open_path, no_open_path_text
 from porefv.flow.pressure import (
     PressureField,
     held_pressures,
@@ -33,6 +35,7 @@ from porefv.flow.pressure import (
 )
 from porefv.flow.pressure_on_grains import acting_pressure
 from porefv.flow.profile import Profile, axis_number, plane_fluxes, profile
+from porefv.flow.regions import region_text
 from porefv.flow.reliability import Reliability, reliability
 from porefv.flow.sizes import ConstrictionSizes, PoreSizes, constriction_sizes, pore_sizes
 from porefv.flow.tortuosity import hydraulic_tortuosity
@@ -248,13 +251,29 @@ class PoreFlow(FixedInputs):
             return throat_conductances(self.mesh, self.conductance, self.walls.slip, self.fluid.viscosity)
 
     @lazy_property
+    def has_open_path(self) -> bool:
+        """Whether an open path joins two different imposed pressures (`flow.open_path.has_open_path`)."""
+        return has_open_path(self.mesh, self.conductances, self.walls_at_pressures, self._inside_pressures)
+
+    @lazy_property
     def solution(self) -> PressureField:
-        """The pressure field, with the solver's report and the isolated pores."""
+        """The pressure field, with the solver's report and the isolated pores.
+
+        Warns
+        -----
+        NoOpenPathWarning
+            If no open path leads from one imposed pressure to another.
+        """
         if self._given is not None:
             return self._given
         if self._at_walls is not None:
             return self._at_walls.field
         conductances = self.conductances
+        if not self.has_open_path:
+            passed = [name for name, held in zip(WALLS, self.walls.held, strict=True) if held]
+            inside = [region_text(fixed.region) for fixed in self.fixed_pressures]
+            said = no_open_path_text(self.mesh, conductances, ", ".join([*passed, *inside]))
+            warnings.warn(said, NoOpenPathWarning, stacklevel=2)
         with Timer(self.timings, "solve"):
             return solve_pressure(
                 self.mesh, conductances, self.walls, sources=self._sources, inside=self._inside_pressures,
@@ -428,8 +447,13 @@ class PoreFlow(FixedInputs):
 
     @lazy_property
     def reliability(self) -> Reliability:
-        """Parts of the dissipation in throats outside the range where the conductance model was tested."""
-        return reliability(self.mesh, self.conductances, self.flux, self.walls.slip)
+        """Parts of the dissipation in throats outside the range where the conductance model was tested.
+
+        Where no open path leads through the sample, and nothing flows, parts of the number of throats.
+        """
+        return reliability(
+            self.mesh, self.conductances, self.flux, self.walls.slip, of_throats=not self.has_open_path
+        )  # fmt: skip
 
     # ---- quantities of the sample ---------------------------------------------------------------------------------
 

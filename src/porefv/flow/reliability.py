@@ -41,6 +41,8 @@ _OVERLAP, _CUT, _OPEN, _RATIO = 1, 2, 4, 8
 class Reliability:
     """Parts of the dissipated power of a flow in throats outside the range where the model was tested.
 
+    Where no open path leads through the sample nothing flows: they are parts of the number of throats then.
+
     Attributes
     ----------
     overlap : float
@@ -55,6 +57,8 @@ class Reliability:
         In throats between spheres whose radii have a ratio of more than 20.
     outside : float
         In throats of any of these kinds.
+    of : {"dissipation", "throats"}
+        What the parts are parts of.
     """
 
     overlap: float
@@ -62,6 +66,7 @@ class Reliability:
     openness: float
     size_ratio: float
     outside: float
+    of: str = "dissipation"
 
     @property
     def warning(self) -> str | None:
@@ -70,14 +75,16 @@ class Reliability:
             return None
         parts = {name: getattr(self, name) for name in ERRORS}
         worst = max(parts, key=lambda name: parts[name])
+        what = "flow's dissipation is in throats" if self.of == "dissipation" else "throats are"
         return (
-            f"{100 * self.outside:.0f} % of the flow's dissipation is in throats outside the range where the "
-            f"conductance model was tested, most of it by {worst.replace('_', ' ')}. Errors of the permeability found "
-            f"there: {ERRORS[worst]}"
+            f"{100 * self.outside:.0f} % of the {what} outside the range where the conductance model was tested, "
+            f"most of it by {worst.replace('_', ' ')}. Errors of the permeability found there: {ERRORS[worst]}"
         )
 
 
-def reliability(mesh: PoreMesh, conductances: np.ndarray, flux: np.ndarray, slip: np.ndarray) -> Reliability:
+def reliability(
+    mesh: PoreMesh, conductances: np.ndarray, flux: np.ndarray, slip: np.ndarray, *, of_throats: bool = False
+) -> Reliability:
     """The parts of the dissipated power of a flow that are outside the tested range; zero where nothing flows.
 
     Parameters
@@ -87,6 +94,8 @@ def reliability(mesh: PoreMesh, conductances: np.ndarray, flux: np.ndarray, slip
         Of the throats [m³/(Pa s), m³/s].
     slip : (6,) bool array
         Walls of symmetry.
+    of_throats : bool
+        Whether to find the parts of the number of throats where nothing flows, because the throats are closed.
     """
     throats = mesh.throats
     power = np.divide(flux**2, conductances, out=np.zeros(len(throats)), where=conductances > 0.0)
@@ -95,11 +104,15 @@ def reliability(mesh: PoreMesh, conductances: np.ndarray, flux: np.ndarray, slip
         kinds_of_throats, len(throats), throats.first_facets, mesh.facets.vertices, mesh.cell_vertices,
         throats.inscribed_circles(slip)[0], np.asarray(slip, bool), kinds,
     )  # fmt: skip
+    of_throats = of_throats and not power.any()
+    if of_throats:
+        power = np.ones(len(throats))
     total = power.sum()
     by_kinds = np.bincount(kinds, power, 16) / (total if total > 0.0 else 1.0)
     bits = np.arange(16)
     overlap, cut, openness, ratio = (float(by_kinds[bits & bit > 0].sum()) for bit in (_OVERLAP, _CUT, _OPEN, _RATIO))
-    return Reliability(overlap, cut, openness, ratio, outside=float(by_kinds[1:].sum()))
+    of = "throats" if of_throats else "dissipation"
+    return Reliability(overlap, cut, openness, ratio, outside=float(by_kinds[1:].sum()), of=of)
 
 
 @kernel(error_model="numpy")

@@ -76,4 +76,4 @@ def darcy_velocity(mesh: PoreMesh, face_flux: np.ndarray) -> np.ndarray:
     box = mesh.box
     # From the middle of the box, so that an imbalance of the fluxes has the least effect.
     middle = 0.5 * (box.lower + box.upper) - mesh.triangulation.origin
-    return -(face_flux[:, None] * (mesh.wall_faces.centroids - middle)).sum(axis=0) / box.volume
+    return (face_flux[:, None] * (middle - mesh.wall_faces.centroids)).sum(axis=0) / box.volume + 0.0  # no -0

@@ -18,6 +18,7 @@ import numpy as np
 from porefv.mesh.facet_kernels import area_factor, frame_of
 from porefv.mesh.laguerre import laguerre_feet
 from porefv.mesh.vectors import cross_product, dot, minus, times, vector_at, wall_distance
+from porefv.packing.orthoschemes import ball_in_orthoscheme
 from porefv.system.kernels import helper, kernel, unsigned_range
 
 
@@ -117,8 +118,8 @@ def _between(r, d1, d2, low, high):
         Area in the face at F_1 in that of P_j less that of P_i [m²].
     """
     sense = -1.0 if (d1 < 0.0) != (d2 < 0.0) else 1.0
-    volume_i, surface_i, face_i = _ball_in_orthoscheme(r, abs(d1), abs(d2), abs(low))
-    volume_j, surface_j, face_j = _ball_in_orthoscheme(r, abs(d1), abs(d2), abs(high))
+    volume_i, surface_i, face_i = ball_in_orthoscheme(r, abs(d1), abs(d2), abs(low))
+    volume_j, surface_j, face_j = ball_in_orthoscheme(r, abs(d1), abs(d2), abs(high))
     at_i = -sense if low < 0.0 else sense
     at_j = -sense if high < 0.0 else sense
     return (
@@ -128,30 +129,3 @@ def _between(r, d1, d2, low, high):
         at_j * surface_j,
         at_j * face_j - at_i * face_i,
     )
-
-
-@helper(error_model="numpy")
-def _ball_in_orthoscheme(r, d1, d2, d3):
-    """Volume, spherical surface, and area in the face at F_1 of a ball within an orthoscheme at its centre.
-
-    Its vertices are 0, F_1 = (d1, 0, 0), F_2 = (d1, d2, 0) and P = (d1, d2, d3); d1, d2 and d3 are not negative. The
-    ball is a cone over the disc in the face, and a spherical part over the rest of the solid angle.
-    """
-    r2 = np.sqrt(d1 * d1 + d2 * d2)
-    r3 = np.sqrt(d1 * d1 + d2 * d2 + d3 * d3)
-    if r >= r3:
-        return d1 * d2 * d3 / 6.0, 0.0, 0.5 * d2 * d3
-    omega = 2.0 * np.arctan2(d2 * d3, (r2 + r3) * (r2 + d1))
-    if r <= d1:
-        return omega * r * r * r / 3.0, omega * r * r, 0.0
-    disc = (r - d1) * (r + d1)
-    angle = np.arctan2(d3, d2)
-    area = hidden = 0.0
-    if disc > d2 * d2:  # the disc reaches beyond the edge of the face: a triangle, and a sector
-        half = np.sqrt(disc - d2 * d2)
-        area = 0.5 * d2 * half
-        hidden = 2.0 * np.arctan2(d2 * half, (r2 + r) * (r2 + d1))
-        angle = max(angle - np.arctan2(half, d2), 0.0)
-    area += 0.5 * angle * disc
-    hidden += angle * (r - d1) / r
-    return (omega - hidden) * r * r * r / 3.0 + d1 * area / 3.0, (omega - hidden) * r * r, area

@@ -1,4 +1,4 @@
-"""Solid volume and porosity by layer: exact segments of the spheres between planes normal to an axis."""
+"""Porosity by layer, between planes normal to an axis: exact for any overlap."""
 
 from __future__ import annotations
 
@@ -6,12 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError
-from porefv.packing.box import WALL_NORMALS, Box, Floats
-from porefv.packing.overlaps import cap_volume
+from porefv.packing.box import Box, Floats, read_only
 from porefv.packing.packing import Packing
 from porefv.system.number_checks import is_finite_number
-
-_TINY = np.finfo(float).tiny
 
 
 def layer_edges(box: Box, axis: int, layers: int) -> Floats:
@@ -30,12 +27,10 @@ def layer_edges(box: Box, axis: int, layers: int) -> Floats:
 def layer_porosities(packing: Packing, axis: int, edges: ArrayLike) -> Floats:
     """Porosity of each layer between planes normal to an axis.
 
-    The solid below a plane is the sum of the spherical segments below it, π h² (r - h / 3) with h the height of the
-    plane above the lowest point of the sphere. As in `Packing.solid_volume`, what a pair of spheres shares counts once,
-    and caps beyond walls do not count. Where a plane cuts a shared lens or a cap, each side has its exact part. The
-    result is exact where no point belongs to three of the spheres and walls. Where there are such points, the volume
-    that they take off the sums over pairs is divided among the layers in proportion to their solid. The porosities,
-    weighted with the volumes of the layers, add up to `Packing.porosity`.
+    The solid of a layer is the sum, over the spheres, of the part of the ball that lies in its Laguerre cell, in the
+    box, and between the planes of the layer. Each part has a closed form (Edelsbrunner 1995 has the same sum over
+    simplices), so that the result is exact for any overlap, also where three or more spheres and walls share points.
+    The porosities, weighted with the volumes of the layers, add up to `Packing.porosity`.
 
     Parameters
     ----------
@@ -72,67 +67,20 @@ def layer_porosities(packing: Packing, axis: int, edges: ArrayLike) -> Floats:
             f"edges of layers must lead from wall to wall, {box.lower[axis]:.6g} to {box.upper[axis]:.6g} m, "
             f"not {edges[0]:.6g} to {edges[-1]:.6g}"
         )
-    # What is counted beyond the outer walls, balls and their caps alike, cancels in the first and the last layer.
-    inner = [_solid_below(packing, axis, place) for place in edges[1:-1]]
-    if packing.triple_overlaps:
-        whole = _solid_below(packing, axis, np.inf)
-        inner = [part * packing.solid_volume / whole for part in inner]
-    below = [0.0, *inner, packing.solid_volume]
-    return 1.0 - np.diff(below) / (np.diff(edges) * box.section(axis))
+    # Not at the top: it loads numba, which a script that only reads a packing does not need.
+    from porefv.packing.solids_in_layers import solids_in_layers
+
+    solids = np.empty(len(edges) - 1)
+    starts, others = _neighbours(packing)
+    solids_in_layers(
+        packing.centres, packing.radii, box.lower, box.upper, starts, others, axis, read_only(edges, "edges"), solids
+    )
+    return 1.0 - solids / (np.diff(edges) * box.section(axis))
 
 
-def _solid_below(packing: Packing, axis: int, place: float) -> float:
-    """Solid volume below a plane by sums over pairs, m³."""
-    centres, radii, found = packing.centres, packing.radii, packing.overlaps
-    heights = place - centres[:, axis]
-    total = cap_volume(radii, np.maximum(heights + radii, 0.0)).sum()
-    i, j = found.pairs.T
-    distance = np.maximum(radii[i] + radii[j] - found.depths, _TINY)
-    # The plane in which two spheres meet, at this distance from each centre, cuts their lens in two caps.
-    to_plane = 0.5 * (distance + (radii[i] - radii[j]) * (radii[i] + radii[j]) / distance)
-    for spheres, others, depth in ((i, j, to_plane), (j, i, distance - to_plane)):
-        cut, whole = _cut_and_whole(radii[spheres], depth, heights[spheres])
-        normals = centres[others[cut]] - centres[spheres[cut]]
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), _TINY)[:, None]
-        parts = _cap_below(radii[spheres[cut]], normals, depth[cut], axis, heights[spheres[cut]])
-        total -= whole + parts.sum()
-    spheres = found.wall_spheres
-    depth = radii[spheres] - found.wall_depths
-    cut, whole = _cut_and_whole(radii[spheres], depth, heights[spheres])
-    normals = WALL_NORMALS[found.wall_ids[cut]]
-    parts = _cap_below(radii[spheres[cut]], normals, depth[cut], axis, heights[spheres[cut]])
-    return float(total - whole - parts.sum())
-
-
-def _cut_and_whole(r: Floats, d: Floats, height: Floats) -> tuple[NDArray[np.int64], float]:
-    """Which caps belong to balls that a plane at a height over the centres cuts; volume of those below it, m³."""
-    below = height >= r
-    clipped = np.clip(d[below], -r[below], r[below])
-    return np.flatnonzero(np.abs(height) < r), float(cap_volume(r[below], r[below] - clipped).sum())
-
-
-def _cap_below(r: Floats, normal: Floats, d: Floats, axis: int, height: Floats) -> Floats:
-    """Volume of a ball where x·n > d and x_axis < height, x from its centre, m³.
-
-    With the planes' normals n₁ = n and n₂ = -e_axis, it is ∮ x·ν dS / 3 over the surface of the body: r / 3 times its
-    area on the sphere (two spherical caps that meet: Tovchigrechko & Vakser 2001), less d_i / 3 times its area in each
-    plane, a segment of a circle.
-    """
-    d1, d2 = np.clip(d, -r, r), np.clip(-height, -r, r)
-    cosine = -normal[:, axis]
-    sine = np.linalg.norm(np.delete(normal, axis, axis=1), axis=1)
-    c1, c2 = d1 / r, d2 / r  # cosines of the angular radii of the caps
-    s1, s2 = np.sqrt((1.0 - c1) * (1.0 + c1)), np.sqrt((1.0 - c2) * (1.0 + c2))
-    first, second = _angle(c2 - cosine * c1, sine * s1), _angle(c1 - cosine * c2, sine * s2)
-    on_sphere = 2.0 * r**2 * (np.pi - _angle(cosine - c1 * c2, s1 * s2) - c1 * first - c2 * second)
-    return (r * on_sphere - d1 * _segment(r * s1, first) - d2 * _segment(r * s2, second)) / 3.0
-
-
-def _angle(adjacent: Floats, hypotenuse: Floats) -> Floats:
-    """Arc cosine of a ratio; 0 or π where circles do not meet."""
-    return np.arccos(np.clip(adjacent / np.maximum(hypotenuse, _TINY), -1.0, 1.0))
-
-
-def _segment(radius: Floats, half_angle: Floats) -> Floats:
-    """Area of a segment of a circle, m²."""
-    return radius**2 * (half_angle - np.sin(half_angle) * np.cos(half_angle))
+def _neighbours(packing: Packing) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Spheres that overlap each sphere: those of sphere i are others[starts[i]] ... others[starts[i + 1] - 1]."""
+    pairs = packing.overlaps.pairs
+    spheres, others = np.concatenate([pairs, pairs[:, ::-1]]).T
+    order = np.argsort(spheres, kind="stable")
+    return np.searchsorted(spheres[order], np.arange(len(packing) + 1)), others[order]

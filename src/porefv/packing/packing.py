@@ -163,8 +163,8 @@ class Packing:
         """The spheres whose centres lie in a box, in that box.
 
         Spheres that reach beyond its walls are cut by them: the part inside stays. Such a packing needs a
-        `wall_tolerance` of the mesh that is large enough, up to 1. Of spheres whose centres are outside, the caps that
-        reach into the box are lost; `metadata` says how many they were.
+        `wall_tolerance` of the mesh that is large enough; 1 is for any crop. Of spheres whose centres are outside, the
+        caps that reach into the box are lost, which leaves voids along its walls; `metadata` says how many they were.
 
         Raises
         ------

@@ -44,6 +44,8 @@ from porefv.system.progress import Progress
 from porefv.system.tables import TABLE_FORMATS
 
 PartOfRadius = Annotated[float, Limits("must lie in [0, 1) (a fraction of a radius)", least=0.0, below=1.0)]
+# A centre lies in the box: no sphere reaches further beyond a wall than its radius.
+Reach = Annotated[float, Limits("must lie in [0, 1] (a fraction of a radius)", least=0.0, most=1.0)]
 
 
 class WallTable(Table):
@@ -91,9 +93,7 @@ class MeshOptions(Table):
         "[one pore](theory.md#united-pores)",
         0.01,
     )
-    wall_tolerance: PartOfRadius = key(
-        "the largest fraction of its radius by which a sphere may reach beyond a wall", 0.05
-    )
+    wall_tolerance: Reach = key("the largest fraction of its radius by which a sphere may reach beyond a wall", 0.05)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,9 @@ def solve_network(
 ) -> NetworkSolution:
     """Solve for the pressures of the pores that are not fixed.
 
+    Where no flowing path joins two different imposed pressures, each part of the network that has no source takes its
+    imposed pressure exactly, so that nothing flows in it.
+
     Parameters
     ----------
     pairs : (t, 2) int array
@@ -74,14 +77,23 @@ def solve_network(
     if free.all():
         raise ComputationError("no pore has an imposed pressure: pressures are defined only up to a constant")
     sources = np.zeros(n) if sources is None else sources
-    isolated = ~reached(pairs, conductances, ~free)
+    parts = joined_parts(pairs, conductances, n)
+    lowest, highest = pressures_of_parts(parts, fixed)
+    isolated = lowest > highest
     if np.any(sources[isolated] != 0.0):
         pore = int(np.flatnonzero(isolated & (sources != 0.0))[0])
         raise ComputationError(f"pore {pore} has a source but no flowing path to an imposed pressure")
 
     pressure = np.where(free, 0.0, fixed)
     rest = np.zeros(n)
-    report = _solve_free(pairs, conductances, pressure, rest, free & ~isolated, sources, solver, tolerance)
+    unknown = free & ~isolated
+    if not (lowest < highest).any():
+        sourced = np.zeros(n, bool)
+        sourced[parts[free & (sources != 0.0)]] = True
+        still = unknown & ~sourced[parts]
+        pressure[still] = lowest[still]
+        unknown &= ~still
+    report = _solve_free(pairs, conductances, pressure, rest, unknown, sources, solver, tolerance)
     if isolated.any():
         solve_isolated(pairs, isolated, ~free, pressure, rest, links=links, tolerance=tolerance)
     return NetworkSolution(pressure, isolated, report, rest)
@@ -127,24 +139,43 @@ def solve_isolated(
 
 def reached(pairs: np.ndarray, weights: np.ndarray, sources: np.ndarray) -> np.ndarray:
     """(n,) bool: nodes that links (t, 2) of positive weight (t,) join to a source, (n,) bool."""
-    return _reached(read_only(pairs), read_only(weights), sources)
+    parts = joined_parts(pairs, weights, len(sources))
+    found = np.zeros(len(sources), bool)
+    found[parts[sources]] = True
+    return found[parts]
+
+
+def pressures_of_parts(parts: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,), (n,): lowest and highest imposed pressure in the part of each node; inf and -inf where there is none [Pa].
+
+    Parameters
+    ----------
+    parts : (n,) int array
+        From `joined_parts`.
+    fixed : (n,) array
+        Imposed pressures, NaN where free [Pa].
+    """
+    held = np.flatnonzero(~np.isnan(fixed))
+    lowest, highest = np.full(len(fixed), np.inf), np.full(len(fixed), -np.inf)
+    np.minimum.at(lowest, parts[held], fixed[held])
+    np.maximum.at(highest, parts[held], fixed[held])
+    return lowest[parts], highest[parts]
+
+
+def joined_parts(pairs: np.ndarray, weights: np.ndarray, nodes: int) -> np.ndarray:
+    """(n,) int: the first node of the part of each node, which links (t, 2) of positive weight (t,) join."""
+    return _joined_parts(read_only(pairs), read_only(weights), nodes)
 
 
 @kernel
-def _reached(pairs, weights, sources):
-    n = sources.shape[0]
-    parent = np.arange(n)
+def _joined_parts(pairs, weights, nodes):
+    parent = np.arange(nodes)
     for t in range(pairs.shape[0]):
         if weights[t] > 0.0:
             join(parent, pairs[t, 0], pairs[t, 1])
-    found = np.zeros(n, np.bool_)
-    for i in range(n):  # a root comes before all that hang on it
+    for i in range(nodes):  # a root comes before all that hang on it
         parent[i] = parent[parent[i]]
-        if sources[i]:
-            found[parent[i]] = True
-    for i in range(n):
-        found[i] = found[parent[i]]
-    return found
+    return parent
 
 
 def _solve_free(pairs, conductances, pressure, rest, free, sources, solver, tolerance):
