@@ -29,7 +29,7 @@ GIVES = {
     "conductance": "flow of a throat: models",
     "solvers": "pressures of a network",
     "flow": "pressure, fluxes, forces",
-    "fipy": "the pores as a FiPy mesh",
+    "fipy": "the fluid as a FiPy mesh",
     "dem": "grains that move",
     "coupling": "grains and fluid together",
     "export": "VTK, meshio, pictures",

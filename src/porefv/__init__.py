@@ -10,7 +10,8 @@ Data flow through the folders of the package in this order; a folder imports onl
     conductance     how much flows through a throat: models
     solvers         the pressure equation on a network
     flow            walls, fluid, pressure, fluxes, velocities, forces
-    fipy            the pores as a FiPy mesh
+    transport       diffusion and solutes in the pores
+    fipy            the fluid as a FiPy mesh
     dem             grains that move: discrete element method
     coupling        grains and fluid together, micromechanics, consolidation
     export          VTK, meshio, pictures, trajectories

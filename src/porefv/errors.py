@@ -101,6 +101,10 @@ class OutOfRangeWarning(PorefvWarning):
     """Much of a flow is in throats of a kind that the conductance model was not tested on."""
 
 
+class TransportWarning(PorefvWarning):
+    """An equation on the fluid has a term or a condition that mostly is not what is meant."""
+
+
 def vector(values: Iterable[float]) -> str:
     """Coordinates as shown in an error: ``0.5, 1, 0.25``."""
     return ", ".join(f"{value:.9g}" for value in values)

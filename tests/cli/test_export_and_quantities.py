@@ -9,7 +9,10 @@ from porefv.cli.program import main
 from porefv.scenes.flow_scene import FlowScene
 
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
-SAMPLE = ["permeability", "pressure", "profile", "pore_sizes", "constriction_sizes", "tortuosity", "velocity", "planes"]
+SAMPLE = [
+    "permeability", "pressure", "profile", "pore_sizes", "constriction_sizes", "tortuosity", "diffusion", "velocity",
+    "planes",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +29,8 @@ def test_info_prints_the_quantities_of_the_sample(solved, capsys):
     assert main(["info", str(solved)]) == 0
     out = capsys.readouterr().out
     for text in (
-        "Sample", "tortuosity", "Darcy velocity", "interstitial velocity", "4 layers along y, porosity",
+        "Sample", "hydraulic tortuosity", "effective diffusivity", "formation factor", "diffusive tortuosity",
+        "Darcy velocity", "interstitial velocity", "4 layers along y, porosity",
         "pore radius, by number", "constriction radius, by flux", "3 planes along y",
     ):  # fmt: skip
         assert text in out

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 
 from porefv.errors import InputError
 from porefv.flow.walls import Walls
@@ -275,3 +276,92 @@ def test_laguerre_cells_are_where_the_power_is_least(mesh_of):
     share = np.bincount(power.argmin(axis=1), minlength=25) / tries
     expected = mesh.laguerre_volumes / mesh.box.volume
     assert (np.abs(share - expected) < 4.5 * np.sqrt(expected * (1.0 - expected) / tries)).all()
+
+
+# ---- surfaces of grains ----------
+
+
+def sphere_surface(radii):
+    return 4.0 * np.pi * (radii**2).sum()
+
+
+def seen_surface(packing, tries, seed):
+    """Surface of a packing's spheres within its box and outside other spheres, by random points; and its scatter."""
+    rng = np.random.default_rng(seed)
+    total = variance = 0.0
+    for centre, radius in zip(packing.centres, packing.radii, strict=True):
+        directions = rng.normal(size=(tries, 3))
+        x = centre + radius * directions / np.linalg.norm(directions, axis=1)[:, None]
+        inside = ((x > packing.box.lower) & (x < packing.box.upper)).all(axis=1)
+        power = ((x[:, None] - packing.centres) ** 2).sum(axis=2) - packing.radii**2
+        part = (inside & (power > -1e-9 * radius**2).all(axis=1)).mean()
+        whole = 4.0 * np.pi * radius**2
+        total += whole * part
+        variance += whole**2 * part * (1.0 - part) / tries
+    return total, np.sqrt(variance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_surfaces_of_pores_add_up_to_those_of_spheres(random_packing, seed):
+    mesh = PoreMesh(random_packing(100, seed=seed))
+    assert_allclose(mesh.pore_surfaces.sum(), sphere_surface(mesh.packing.radii), rtol=1e-12)
+    assert (mesh.pore_surfaces > 0.0).all()
+
+
+def test_eight_pores_around_a_sphere_have_an_eighth_of_it_each():
+    mesh = PoreMesh(Packing([[0.5, 0.5, 0.5]], [0.3], Box([0, 0, 0], [1, 1, 1])))
+    assert_allclose(mesh.pore_surfaces, np.full(8, 0.5 * np.pi * 0.3**2), rtol=1e-12)
+
+
+def test_surfaces_end_at_a_wall():
+    mesh = PoreMesh(Packing([[0.2, 0.5, 0.5]], [0.3], Box([0, 0, 0], [1, 1, 1])), wall_tolerance=0.5)
+    assert_allclose(mesh.pore_surfaces.sum(), 2.0 * np.pi * 0.3 * (0.3 + 0.2), rtol=1e-12)
+
+
+def test_surfaces_end_at_an_edge_of_the_box():
+    r, d = 0.4, 0.2
+    mesh = PoreMesh(Packing([[d, d, 0.5]], [r], Box([0, 0, 0], [1, 1, 1])), wall_tolerance=0.9)
+    # The part beyond both walls: arcs of the circles at distance x.
+    beyond_both = quad(lambda x: 2.0 * r * np.arccos(d / np.sqrt(r * r - x * x)), d, np.sqrt(r * r - d * d))[0]
+    seen = 4.0 * np.pi * r * r - 2.0 * 2.0 * np.pi * r * (r - d) + beyond_both
+    assert_allclose(mesh.pore_surfaces.sum(), seen, rtol=1e-7)
+
+
+def test_surfaces_have_no_part_in_another_sphere():
+    r, s, apart = 0.2, 0.15, 0.3
+    mesh = PoreMesh(Packing([[0.35, 0.5, 0.5], [0.35 + apart, 0.5, 0.5]], [r, s], Box([0, 0, 0], [1, 1, 1])))
+    d = 0.5 * (apart**2 + r**2 - s**2) / apart
+    caps = 2.0 * np.pi * (r * (r - d) + s * (s - (apart - d)))
+    assert_allclose(mesh.pore_surfaces.sum(), sphere_surface(mesh.packing.radii) - caps, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1.2, 1.4])
+def test_surfaces_are_exact_where_three_spheres_overlap(reference, factor):
+    packing = reference("n25_s1")
+    cemented = Packing(packing.centres, factor * packing.radii, packing.box)
+    assert cemented.triple_overlaps
+    mesh = PoreMesh(cemented, wall_tolerance=0.9)
+    seen, scatter = seen_surface(cemented, 50_000, seed=0)
+    assert abs(mesh.pore_surfaces.sum() - seen) < 4.0 * scatter
+    assert scatter < 2e-3 * seen
+
+
+def test_the_surface_in_a_pore_is_what_lies_in_its_cells(mesh_of):
+    """Random points on the spheres, each counted in the tetrahedron that holds it."""
+    mesh = mesh_of("n25_s1")
+    cells = np.flatnonzero((mesh.cells < mesh.n_spheres).all(axis=1))
+    corners = mesh.packing.centres[mesh.cells[cells]]
+    rng, tries = np.random.default_rng(0), 20_000
+    found = variance = np.zeros(len(cells))
+    for centre, radius in zip(mesh.packing.centres, mesh.packing.radii, strict=True):
+        directions = rng.normal(size=(tries, 3))
+        x = centre + radius * directions / np.linalg.norm(directions, axis=1)[:, None]
+        parts = np.linalg.solve(
+            (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1), (x[None] - corners[:, :1]).transpose(0, 2, 1)
+        )
+        part = ((parts > 0.0).all(axis=1) & (parts.sum(axis=1) < 1.0)).mean(axis=1)
+        whole = 4.0 * np.pi * radius**2
+        found = found + whole * part
+        variance = variance + whole**2 * part * (1.0 - part) / tries
+    assert len(cells) > 20
+    assert (np.abs(mesh.cell_surfaces[cells] - found) < 5.0 * np.sqrt(variance)).all()

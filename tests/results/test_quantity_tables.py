@@ -11,13 +11,15 @@ from porefv import results
 from porefv.errors import InputError
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
+from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.packing import Packing
 from porefv.results import Sections
 from porefv.results.quantity_pictures import draw_quantity, quantity_picture
 from porefv.scenes.flow_scene import FlowScene
+from porefv.transport.diffusion import effective_diffusion
 
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
-SAMPLE = ("profile", "pore_sizes", "constriction_sizes", "tortuosity", "velocity", "planes")
+SAMPLE = ("profile", "pore_sizes", "constriction_sizes", "tortuosity", "diffusion", "velocity", "planes")
 TABLES = ("profile", "pore_sizes", "constriction_sizes", "planes")
 
 
@@ -55,6 +57,37 @@ def test_scalars_read_back_to_the_last_bit(flow, found):
     np.testing.assert_array_equal(found.interstitial_velocity, flow.interstitial_velocity)
 
 
+def test_diffusion_is_that_of_the_mesh_along_the_axis_of_flow(flow, found):
+    expected = effective_diffusion(flow.mesh, "y")
+    assert found.diffusion == {
+        "axis": "y",
+        "relative_diffusivity": expected.relative_diffusivity,
+        "formation_factor": expected.formation_factor,
+        "diffusive_tortuosity": expected.diffusive_tortuosity,
+    }
+
+
+def test_diffusion_has_the_axis_that_is_asked_for(flow, tmp_path):
+    directory = results.write(
+        flow, tmp_path / "results", quantities=["diffusion"], vtk=False, sections=Sections(axis="x")
+    )
+    found = results.read(directory).diffusion
+    assert found["axis"] == "x"
+    assert found["relative_diffusivity"] == effective_diffusion(flow.mesh, "x").relative_diffusivity
+
+
+def test_where_nothing_diffuses_the_rest_is_unknown(tmp_path):
+    packing = Packing.read(PACKINGS / "n25_s1.csv")
+    closed = PoreMesh(Packing(packing.centres, 1.5 * packing.radii, packing.box), wall_tolerance=0.9)
+    directory = results.write(
+        PoreFlow(closed, Walls.along("y")), tmp_path / "results", quantities=["diffusion"], vtk=False
+    )
+    found = results.read(directory).diffusion
+    assert found == {
+        "axis": "y", "relative_diffusivity": 0.0, "formation_factor": None, "diffusive_tortuosity": None
+    }  # fmt: skip
+
+
 def test_the_summary_has_medians_and_units(flow, found):
     summary = found.summary
     assert summary["pore_sizes"]["by_number"]["r50"] == flow.pore_sizes.by_number.quantile(0.5)
@@ -74,7 +107,7 @@ def test_only_what_is_asked_for_is_written(flow, tmp_path, quantity):
 
 
 @pytest.mark.parametrize(
-    "attribute", [*TABLES, "tortuosity", "darcy_velocity", "interstitial_velocity"]
+    "attribute", [*TABLES, "tortuosity", "diffusion", "darcy_velocity", "interstitial_velocity"]
 )  # fmt: skip
 def test_what_was_not_asked_for_is_an_error_that_names_the_remedy(flow, tmp_path, attribute):
     written = results.read(results.write(flow, tmp_path / "results", quantities=["permeability"], vtk=False))

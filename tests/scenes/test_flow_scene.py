@@ -359,6 +359,7 @@ def test_lines_of_keys_are_found_in_any_spelling():
         ({"quantities": ["tortuosity"]}, "tortuosity needs exactly two pressure walls"),
         ({"quantities": ["profile"]}, "profile needs an axis"),
         ({"quantities": ["planes"]}, "planes needs an axis"),
+        ({"quantities": ["diffusion"]}, "diffusion needs an axis"),
         ({"layers": 0}, "layers: expected a whole number, 1 or more"),
         ({"axis": "w"}, "axis"),
         ({"planes": 0.5}, "planes: expected a list of finite numbers"),

@@ -31,7 +31,8 @@ flow = {{ conductance = "{model}", solver = "{solver}", gravity = [0.0, 0.0, -9.
 
 [output]
 directory = "results/flow"
-quantities = ["permeability", "pressure", "forces", "profile", "pore_sizes", "constriction_sizes", "planes"]
+quantities = ["permeability", "pressure", "forces", "profile", "pore_sizes", "constriction_sizes", "planes",
+    "diffusion"]
 vtk = true
 """
 FLOWS = [

@@ -171,7 +171,11 @@ def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     rows: list[tuple[str, Any]] = []
     if "tortuosity" in summary:
         tortuosity = summary["tortuosity"]
-        rows.append(("tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}"))
+        rows.append(
+            ("hydraulic tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}")
+        )
+    if "diffusion" in summary:
+        rows += _diffusion_rows(summary["diffusion"])
     if "velocity" in summary:
         rows += [
             ("Darcy velocity", f"({vector_text(summary['velocity']['darcy'])}) m/s"),
@@ -194,6 +198,16 @@ def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         fluxes = dict.fromkeys(f"{flux:.6g}" for flux in planes["flux"])  # one, where they are the same
         rows.append(("flux through planes", f"{' to '.join(fluxes)} m³/s, {count}"))
     return rows
+
+
+def _diffusion_rows(found: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    if found["relative_diffusivity"] == 0.0:
+        return [("effective diffusivity", f"0 along {found['axis']}, as no open path leads through the sample")]
+    return [
+        ("effective diffusivity", f"{found['relative_diffusivity']:.6g} of the fluid's, along {found['axis']}"),
+        ("formation factor", f"{found['formation_factor']:.6g}"),
+        ("diffusive tortuosity", f"{found['diffusive_tortuosity']:.6g}"),
+    ]
 
 
 def _radii(found: Mapping[str, float | None]) -> str:

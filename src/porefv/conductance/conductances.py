@@ -55,7 +55,7 @@ def ensure_pore_mesh(mesh: PoreMesh) -> None:
         raise InputError(f"mesh must be a PoreMesh, not {given}: write PoreMesh(packing)")
 
 
-def check_conductances(mesh: PoreMesh, conductances: ArrayLike) -> np.ndarray:
+def check_conductances(mesh: PoreMesh, conductances: ArrayLike, unit: str = "m³/(Pa s)") -> np.ndarray:
     """(t,) float array of conductances; InputError if the shape is another, or a value is negative or not finite."""
     ensure_pore_mesh(mesh)
     found = one_value_each(conductances, len(mesh.throats), "throat", "conductances")
@@ -63,6 +63,6 @@ def check_conductances(mesh: PoreMesh, conductances: ArrayLike) -> np.ndarray:
     if len(wrong):
         raise InputError(
             f"conductances must be finite and not negative: {counted(len(wrong), 'throat')} are not, the first of them "
-            f"throat {wrong[0]} with {found[wrong[0]]:g} m³/(Pa s); zero closes a throat"
+            f"throat {wrong[0]} with {found[wrong[0]]:g} {unit}; zero closes a throat"
         )
     return found

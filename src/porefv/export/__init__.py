@@ -11,16 +11,18 @@ if TYPE_CHECKING:
     from porefv.export.meshio_mesh import to_meshio
     from porefv.export.openpnm_network import openpnm_network
     from porefv.export.pictures import flow_picture, picture
+    from porefv.export.pore_viewer import PoreViewer
     from porefv.export.trajectories import Trajectory
     from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, to_pyvista
 
 __all__ = [
-    "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "picture", "spheres_polydata", "throats_polydata",
-    "to_meshio", "to_pyvista",
+    "PoreViewer", "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "picture", "spheres_polydata",
+    "throats_polydata", "to_meshio", "to_pyvista",
 ]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
     {
+        "PoreViewer": "porefv.export.pore_viewer",
         "Trajectory": "porefv.export.trajectories",
         "cells_grid": "porefv.export.vtk_datasets",
         "flow_picture": "porefv.export.pictures",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from types import NoneType
 from typing import TYPE_CHECKING
 
@@ -50,7 +50,7 @@ from porefv.system.number_checks import MOST, ensure_finite, three_numbers
 from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
-    from porefv.fipy.pressure_problem import FipyProblem
+    from porefv.fipy.flow_problem import FlowProblem
 
 STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
 
@@ -322,14 +322,14 @@ class PoreFlow(FixedInputs):
         return outflows if self._sources is None else outflows - self._sources
 
     @lazy_property
-    def _face_flux(self) -> np.ndarray:
-        """(w,): flux into the sample through each wall face [m³/s]."""
+    def face_flux(self) -> np.ndarray:
+        """(w,): flux into the sample through each of `mesh.wall_faces` [m³/s]."""
         return wall_face_fluxes(self.mesh, self._outflow_of_pores, self.walls_at_pressures.held)
 
     @property
     def wall_flux(self) -> dict[str, float]:
         """Flux into the sample through each wall [m³/s]; zero through impervious ones."""
-        totals = wall_fluxes(self.mesh, self._face_flux)
+        totals = wall_fluxes(self.mesh, self.face_flux)
         return {name: float(q) for name, q in zip(WALLS, totals, strict=True)}
 
     @property
@@ -404,10 +404,10 @@ class PoreFlow(FixedInputs):
         injected = None
         if self._inside is not None:  # all that does not come through a wall
             through_walls = np.bincount(
-                self.mesh.cell_pore[self.mesh.wall_faces.cells], self._face_flux, self.mesh.n_pores
+                self.mesh.cell_pore[self.mesh.wall_faces.cells], self.face_flux, self.mesh.n_pores
             )
             injected = net_outflows(self.mesh, self.flux) - through_walls
-        velocities = pore_velocities(self.mesh, self.flux, self._face_flux, injected)
+        velocities = pore_velocities(self.mesh, self.flux, self.face_flux, injected)
         return ensure_finite(velocities, "velocities")
 
     @property
@@ -462,7 +462,7 @@ class PoreFlow(FixedInputs):
         """(3,): mean velocity over the box, grains at rest included (`flow.velocity.darcy_velocity`) [m/s]."""
         if self._inside is not None:  # fluid enters inside the box, too
             return (self.pore_velocity * self.mesh.pore_volumes[:, None]).sum(axis=0) / self.mesh.box.volume
-        return darcy_velocity(self.mesh, self._face_flux)
+        return darcy_velocity(self.mesh, self.face_flux)
 
     @property
     def interstitial_velocity(self) -> np.ndarray:
@@ -482,7 +482,7 @@ class PoreFlow(FixedInputs):
             raise InputError(
                 "tortuosity needs exactly two pressure walls, opposite each other, and no regions that drive"
             )
-        return hydraulic_tortuosity(self.mesh, self.flux, self._face_flux, self.walls.axis)
+        return hydraulic_tortuosity(self.mesh, self.flux, self.face_flux, self.walls.axis)
 
     @lazy_property
     def pore_sizes(self) -> PoreSizes:
@@ -500,7 +500,7 @@ class PoreFlow(FixedInputs):
 
     def plane_fluxes(self, places: Sequence[float] | np.ndarray, axis: str | None = None) -> np.ndarray:
         """(p,): flux through planes at places (p,) along an axis, that of flow by default (`flow.profile`) [m³/s]."""
-        return plane_fluxes(self.mesh, self.flux, self._face_flux, axis_number(axis, self.walls), places)
+        return plane_fluxes(self.mesh, self.flux, self.face_flux, axis_number(axis, self.walls), places)
 
     # ---- forces -------------------------------------------------------------------------------------------------
 
@@ -519,11 +519,17 @@ class PoreFlow(FixedInputs):
             ensure_finite(forces.total, "forces")
             return forces
 
-    def to_fipy(self) -> FipyProblem:
-        """The same problem posed in FiPy: its mesh, variable, coefficient and equation."""
-        from porefv.fipy.pressure_problem import FipyProblem
+    def to_fipy(self, without: Collection[str] = ()) -> FlowProblem:
+        """The flow in FiPy: its mesh, velocity, and pressure equation (see `porefv.fipy`).
 
-        return FipyProblem(self)
+        Parameters
+        ----------
+        without : collection of str
+            Walls whose pores are left out of the mesh.
+        """
+        from porefv.fipy.flow_problem import FlowProblem
+
+        return FlowProblem(self, without)
 
     def to_openpnm(self) -> dict[str, np.ndarray]:
         """The network with its conductances in the names of OpenPNM (see `porefv.export.openpnm_network`)."""

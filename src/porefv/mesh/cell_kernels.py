@@ -146,10 +146,21 @@ def _add_difference(by, i, factor, vector):
 
 
 @kernel
-def cell_solids(first, last, cells, vertices, solids):
-    """Fill in the volume (m,) of the balls, each cut by its Laguerre planes, in cells first ... last - 1."""
+def cell_solids(first, last, cells, vertices, solids, surfaces):
+    """Fill in what cells first ... last - 1 have of the balls, each cut by its Laguerre planes.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows to treat: first ... last - 1.
+    cells : (m, 4) int32 array
+    vertices : Vertices
+    solids, surfaces : (m,) arrays
+        Volume, and spherical surface, to be filled in [m³, m²].
+    """
     for t in unsigned_range(first, last):
         total = 0.0
+        surface = 0.0
         for i in range(4):
             k = cells[t, i]
             if k >= vertices.n_spheres:
@@ -159,7 +170,9 @@ def cell_solids(first, last, cells, vertices, solids):
             w = towards(k, cells[t, (i + 3) % 4], vertices)
             numerator, denominator = _tangent(u, v, w)
             r = vertices.sizes[k]
-            total += 2.0 * np.arctan2(abs(numerator), denominator) * r * r * r / 3.0
+            seen = 2.0 * np.arctan2(abs(numerator), denominator) * r * r
+            total += seen * r / 3.0
+            surface += seen
             for j in range(3):
                 m = cells[t, (i + 1 + j) % 4]
                 edge = u if j == 0 else (v if j == 1 else w)
@@ -172,7 +185,9 @@ def cell_solids(first, last, cells, vertices, solids):
                 psi = np.arctan2(np.sqrt(dot(x, x)), dot(a, b))
                 h = r - d
                 total -= psi * h * h * (3.0 * r - h) / 6.0
+                surface -= psi * r * h
         solids[t] = total
+        surfaces[t] = surface
 
 
 @kernel

@@ -68,6 +68,7 @@ class CellMesh(FixedInputs):
         if box is not None:
             packing = packing.with_box(box)
         self.packing = packing.validate(wall_tolerance)
+        self.wall_tolerance = wall_tolerance
         assert packing.box is not None  # validate has seen to it
         self.box: Box = packing.box
 
@@ -173,12 +174,26 @@ class CellMesh(FixedInputs):
     @lazy_property
     def cell_void_volumes(self) -> np.ndarray:
         """(m,): volume of each cell outside the spheres [m³]."""
+        return self.cell_volumes - self._cell_solids[0]
+
+    @lazy_property
+    def cell_surfaces(self) -> np.ndarray:
+        """(m,): surface of the spheres in each cell, without what other spheres and walls cover [m²]."""
+        return self._cell_solids[1]
+
+    @lazy_property
+    def _cell_solids(self) -> tuple[np.ndarray, np.ndarray]:
+        """(m,): volume and surface of the solid in each cell [m³, m²]."""
         if self.packing.triple_overlaps:
             facets = self.facets
-            return self.cell_volumes - np.bincount(facets.cells.ravel(), facets.solids.ravel(), self.n_cells)
-        solids = np.empty(self.n_cells)
-        for_rows(cell_solids, self.n_cells, self.cells, self.cell_vertices, solids)
-        return self.cell_volumes - solids
+            cells = facets.cells.ravel()
+            return (
+                np.bincount(cells, facets.solids.ravel(), self.n_cells),
+                np.bincount(cells, facets.solid_surfaces.ravel(), self.n_cells),
+            )
+        solids, surfaces = np.empty((2, self.n_cells))
+        for_rows(cell_solids, self.n_cells, self.cells, self.cell_vertices, solids, surfaces)
+        return solids, surfaces
 
     @lazy_property
     def laguerre_volumes(self) -> np.ndarray:

@@ -127,18 +127,24 @@ class Facets(FixedInputs):
         return volumes, surfaces
 
     @lazy_property
-    def _union(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        volumes, surfaces, solids = np.empty(len(self)), np.empty((len(self), 3)), np.empty((len(self), 2))
+    def _union(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        volumes, surfaces = np.empty(len(self)), np.empty((len(self), 3))
+        solids, solid_surfaces = np.empty((2, len(self), 2))
         for_rows(
             union_volumes, len(self), self.topology, self.mesh.local_vertices, self.mesh.cell_vertices, volumes,
-            surfaces, solids,
+            surfaces, solids, solid_surfaces,
         )  # fmt: skip
-        return volumes, surfaces, solids
+        return volumes, surfaces, solids, solid_surfaces
 
     @property
     def solids(self) -> np.ndarray:
         """(f, 2): solid from each facet to the Laguerre vertex of its first, and of its second cell, signed [m³]."""
         return self._union[2]
+
+    @property
+    def solid_surfaces(self) -> np.ndarray:
+        """(f, 2): surface of spheres from each facet to its first, and to its second Laguerre vertex, signed [m²]."""
+        return self._union[3]
 
     @property
     def volumes(self) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from porefv.packing.packing import Packing
 from porefv.system.lazy import lazy_property
 
 if TYPE_CHECKING:
-    from porefv.fipy.pore_mesh import FipyPoreMesh
+    from porefv.fipy.fluid_mesh import FluidMesh
 
 # Laguerre vertices this close, relative to the smallest sphere of the facet between them, coincide but for rounding.
 TIE_TOLERANCE = 1e-9
@@ -111,6 +112,17 @@ class PoreMesh(CellMesh):
         return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
 
     @lazy_property
+    def pore_surfaces(self) -> np.ndarray:
+        """(n_pores,): surface of the grains in each pore, without what other grains and walls cover [m²].
+
+        They add up to the wetted surface of the packing, whatever the overlap. Each value is exact where no sphere
+        reaches through the facet opposite to its centre. Without overlap none is negative. With overlap, what is
+        covered outside a cell counts against it, as in `cell_void_volumes`: single flat cells may have less than
+        nothing, and a neighbour as much more.
+        """
+        return np.bincount(self.cell_pore, self.cell_surfaces, self.n_pores)
+
+    @lazy_property
     def pore_points(self) -> np.ndarray:
         """(n_pores, 3): Laguerre vertex of each pore, that of a united pore the mean of those of its cells [m]."""
         if not self.n_united:
@@ -136,17 +148,17 @@ class PoreMesh(CellMesh):
         """The throats between the pores."""
         return Throats(self)
 
-    def to_fipy(self, held: np.ndarray | None = None) -> FipyPoreMesh:
-        """The pores as a `fipy` mesh (see `porefv.fipy`).
+    def to_fipy(self, without: Collection[str] = ()) -> FluidMesh:
+        """The fluid in the pores as a FiPy mesh (see `porefv.fipy`).
 
         Parameters
         ----------
-        held : (n_pores,) bool array, optional
-            Pores of imposed value: left out of the mesh, their throats become exterior faces.
+        without : collection of str
+            Walls whose pores are left out, such as ("y_min", "y_max"): their throats become exterior faces.
         """
-        from porefv.fipy.pore_mesh import FipyPoreMesh
+        from porefv.fipy.fluid_mesh import FluidMesh
 
-        return FipyPoreMesh(self, held)
+        return FluidMesh(self, without)
 
     def to_openpnm(self) -> dict[str, np.ndarray]:
         """The pores and throats as a plain dictionary in the names of OpenPNM (see `porefv.export.openpnm_network`)."""

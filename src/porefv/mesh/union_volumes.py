@@ -23,7 +23,7 @@ from porefv.system.kernels import helper, kernel, unsigned_range
 
 
 @kernel(error_model="numpy")
-def union_volumes(first, last, facets, laguerre_vertices, vertices, volumes, surfaces, solids):
+def union_volumes(first, last, facets, laguerre_vertices, vertices, volumes, surfaces, solids, solid_surfaces):
     """As `porefv.mesh.facet_volumes.facet_volumes`, for any overlap, and the solid on both sides of each facet.
 
     Parameters
@@ -38,6 +38,8 @@ def union_volumes(first, last, facets, laguerre_vertices, vertices, volumes, sur
         Void volume φ of each facet and solid surface γ^k of each of its vertices, to be filled [m³, m²].
     solids : (f, 2) array
         Solid between the facet and the Laguerre vertex of its first, and of its second cell, to be filled [m³].
+    solid_surfaces : (f, 2) array
+        Surface of spheres there, to be filled [m²].
     """
     for f in unsigned_range(first, last):
         n, points, _ = vertices
@@ -47,7 +49,7 @@ def union_volumes(first, last, facets, laguerre_vertices, vertices, volumes, sur
         pj = minus(vector_at(facets.cells[f, 1], laguerre_vertices), vector_at(a, points))
         up = 1.0 / twice if twice > 0.0 else 0.0
         low, high = dot(cross, pi) * up, dot(cross, pj) * up
-        before = after = 0.0
+        before = after = surface_before = surface_after = 0.0
         for v in range(3):
             surfaces[f, v] = 0.0
         # Edges in the facet's cyclic sense. Each has an orthoscheme on both sides, at the spheres that it joins.
@@ -72,19 +74,24 @@ def union_volumes(first, last, facets, laguerre_vertices, vertices, volumes, sur
                 beyond = 0.0
             else:
                 d, beyond = laguerre_feet(u, vertices.sizes[k], vertices.sizes[m])
-            lower, upper, surface, face = _between(vertices.sizes[k], d, across, low, high)
+            lower, upper, surface_i, surface_j, face = _between(vertices.sizes[k], d, across, low, high)
             before += lower
             after += upper
-            surfaces[f, of_k] += surface
+            surface_before += surface_i
+            surface_after += surface_j
+            surfaces[f, of_k] += surface_j - surface_i
             if m < n:
-                lower, upper, surface, _ = _between(vertices.sizes[m], beyond, across, low, high)
+                lower, upper, surface_i, surface_j, _ = _between(vertices.sizes[m], beyond, across, low, high)
                 before += lower
                 after += upper
-                surfaces[f, of_m] += surface
+                surface_before += surface_i
+                surface_after += surface_j
+                surfaces[f, of_m] += surface_j - surface_i
             else:
                 # The wall's own face, a triangle between F_1 and the vertices, less what the ball covers of it.
                 surfaces[f, of_m] += 0.5 * across * (high - low) - face
         solids[f, 0], solids[f, 1] = -before, after
+        solid_surfaces[f, 0], solid_surfaces[f, 1] = -surface_before, surface_after
         volumes[f] = area_factor(frame, vertices) * twice * (high - low) / 3.0 - (after - before)
 
 
@@ -103,12 +110,12 @@ def _between(r, d1, d2, low, high):
 
     Returns
     -------
-    float
+    float, float
         Volume in that of P_i, and in that of P_j [m³].
+    float, float
+        Surface in that of P_i, and in that of P_j [m²].
     float
-        Surface in that of P_j less that of P_i [m²].
-    float
-        Area in the face at F_1, likewise [m²].
+        Area in the face at F_1 in that of P_j less that of P_i [m²].
     """
     sense = -1.0 if (d1 < 0.0) != (d2 < 0.0) else 1.0
     volume_i, surface_i, face_i = ball_in_orthoscheme(r, abs(d1), abs(d2), abs(low))
@@ -118,6 +125,7 @@ def _between(r, d1, d2, low, high):
     return (
         at_i * volume_i,
         at_j * volume_j,
-        at_j * surface_j - at_i * surface_i,
+        at_i * surface_i,
+        at_j * surface_j,
         at_j * face_j - at_i * face_i,
     )

@@ -18,6 +18,7 @@ from porefv.packing.box import Box
 from porefv.packing.layers import layer_edges
 from porefv.results.csv_table import read_csv, write_csv
 from porefv.system.number_checks import known
+from porefv.transport.diffusion import EffectiveDiffusion, effective_diffusion
 
 # Fractions of the quantiles in the summary.
 QUANTILES = (0.1, 0.5, 0.9)
@@ -56,7 +57,7 @@ class Sections:
         """InputError, before anything is computed, if a quantity cannot be computed with these walls and this box."""
         if "tortuosity" in quantities and walls.axis is None:
             raise InputError("tortuosity needs exactly two pressure walls, opposite each other")
-        if "profile" in quantities or "planes" in quantities:
+        if {"profile", "planes", "diffusion"} & set(quantities):
             axis = axis_number(self.axis, walls)
             lower, upper = float(box.lower[axis]), float(box.upper[axis])
             for place in self.planes or ():
@@ -136,7 +137,7 @@ TABLES = {
     ),
     "planes": QuantityTable("planes.csv", {"place": float, "flux": float}, _planes),
 }
-SAMPLE_QUANTITIES = ("profile", "pore_sizes", "constriction_sizes", "tortuosity", "velocity", "planes")
+SAMPLE_QUANTITIES = ("profile", "pore_sizes", "constriction_sizes", "tortuosity", "diffusion", "velocity", "planes")
 
 
 def compute_tables(flow: PoreFlow, quantities: Collection[str], sections: Sections) -> dict[str, np.ndarray]:
@@ -188,9 +189,23 @@ def quantity_summaries(
         found[quantity]["table"] = TABLES[quantity].file
     if "tortuosity" in quantities:
         found["tortuosity"] = known(flow.tortuosity)
+    if "diffusion" in quantities:
+        along = "xyz"[axis_number(sections.axis, flow.walls)]
+        found["diffusion"] = _diffusion(effective_diffusion(flow.mesh, along, tolerance=flow.tolerance))
     if "velocity" in quantities:
         found["velocity"] = {"darcy": flow.darcy_velocity, "interstitial": flow.interstitial_velocity}
     return found
+
+
+def _diffusion(found: EffectiveDiffusion) -> dict[str, Any]:
+    """The numbers; None for those that are not finite, as nothing passes."""
+    passes = found.relative_diffusivity > 0.0
+    return {
+        "axis": found.axis,
+        "relative_diffusivity": found.relative_diffusivity,
+        "formation_factor": found.formation_factor if passes else None,
+        "diffusive_tortuosity": found.diffusive_tortuosity if passes else None,
+    }
 
 
 def _radii(found: Distribution) -> dict[str, float | None]:

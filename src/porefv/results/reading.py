@@ -76,6 +76,11 @@ class Results:
         return self._of_summary("tortuosity")  # type: ignore[no-any-return]
 
     @property
+    def diffusion(self) -> dict[str, Any]:
+        """`axis`, `relative_diffusivity`, `formation_factor`, `diffusive_tortuosity`; None where nothing diffuses."""
+        return self._of_summary("diffusion")  # type: ignore[no-any-return]
+
+    @property
     def darcy_velocity(self) -> np.ndarray:
         """(3,): mean velocity over the box, grains included [m/s]."""
         return np.array(self._of_summary("velocity")["darcy"])

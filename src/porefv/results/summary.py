@@ -35,6 +35,7 @@ UNITS = {
     "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "gap": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
     "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1",
+    "diffusion": "1",
     "profile": "1",
 }  # fmt: skip
 

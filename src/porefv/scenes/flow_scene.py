@@ -133,7 +133,7 @@ class FlowOutput(Table):
         'what is computed: any of `"permeability"`, `"permeabilities"` (along x, y and z, see '
         '[directions](boundary.md#permeabilities-along-all-axes)), `"pressure"`, `"forces"`, and of the '
         '[quantities of the sample](quantities.md) `"profile"`, `"pore_sizes"`, `"constriction_sizes"`, '
-        '`"tortuosity"`, `"velocity"`, `"planes"`. An empty list computes the pores alone',
+        '`"tortuosity"`, `"diffusion"`, `"velocity"`, `"planes"`. An empty list computes the pores alone',
         ("permeability",),
     )
     vtk: bool = key("whether to write the files for [ParaView](paraview.md) and for `porefv plot`, too", False)
@@ -143,7 +143,9 @@ class FlowOutput(Table):
         "csv",
     )
     axis: Annotated[str, Choice(("x", "y", "z"))] | None = key(
-        'axis normal to the layers and planes: `"x"`, `"y"` or `"z"`', None, shown="the axis of flow"
+        'axis normal to the layers and planes, and of `"diffusion"`: `"x"`, `"y"` or `"z"`',
+        None,
+        shown="the axis of flow",
     )
     layers: Annotated[int, Whole(least=1)] = key('number of equally thick layers of `"profile"`', 10)
     planes: Annotated[tuple[float, ...], Numbers("a list of finite numbers such as [0.25, 0.5]")] | None = key(
@@ -241,7 +243,7 @@ class FlowScene(Scene):
                     "permeability is that between two walls, without [[sources]] and [[pressures]]. Drop it from the "
                     "quantities, or drop these tables."
                 )
-        for quantity in ("profile", "planes"):
+        for quantity in ("profile", "planes", "diffusion"):
             if quantity in asked and axis is None and self.output.axis is None:
                 raise refused(
                     f"{quantity} needs an axis, and the pressure walls are not one pair of opposite walls. "

@@ -1,0 +1,288 @@
+"""PoreSolver: the linear solver for FiPy's equations on a FluidMesh.
+
+FiPy's default tolerance is relative to the right-hand side, which values given on walls make 10⁶ times larger: time
+steps then leave the answer as it was, without a word. A PoreSolver measures what the pores fail to conserve against
+what passes through them, and has an error where that is not small.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import LinearOperator, SuperLU, bicgstab, spilu, splu
+
+from porefv.errors import ComputationError, InputError, counted
+from porefv.fipy.fipy_import import load_fipy
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.conjugate_gradients import conjugate_gradients, refined
+from porefv.solvers.direct import DirectFactor
+from porefv.solvers.network import Network
+from porefv.solvers.solver import DIRECT_LIMIT, PRESSURE_TOLERANCE, TOLERANCE
+
+fipy = load_fipy()
+
+# Up to so many unknowns an unsymmetric matrix is factored; beyond, BiCGStab with an incomplete factor costs less
+# (benchmarks/fipy_solvers.py).
+FACTOR_LIMIT = 20_000
+# Entries of the incomplete factor below this part of their column are dropped.
+DROP = 1e-3
+# A sum over a row of the matrix below this part of its diagonal is rounding.
+ROUNDING = 1e-14
+# Matrices whose factors are kept: a few equations that are solved in turn.
+KEPT = 4
+_EPSILON = float(np.finfo(float).eps)
+_RESTARTS = 20
+_CORRECTIONS = 5
+
+
+class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[name-defined]
+    """Solves FiPy's equations to a bound on what the pores fail to conserve.
+
+    Symmetric M-matrices (diffusion, pressure, with or without time) are solved by conjugate gradients with an
+    approximate Cholesky factor, others (convection, coupled equations) by a sparse factor, or by BiCGStab with an
+    incomplete one where there are more than `FACTOR_LIMIT` unknowns. Factors are kept as long as the matrix stays the
+    same, for the last `KEPT` matrices.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest Σ|b - A x|, relative to the flow: half of what enters and leaves the unknowns, ½ Σ|e x - b| with e the
+        sums of the matrix's columns.
+    iterations : int
+        Most iterations.
+
+    Raises
+    ------
+    InputError
+        For a tolerance that is not in (0, 1).
+    ComputationError
+        On solving: if the tolerance is not reached, values are not finite, or some unknowns are not determined.
+
+    Examples
+    --------
+    >>> import fipy
+    >>> mesh = PoreMesh(Packing.read("data/packings/n25_s1.csv")).to_fipy()
+    >>> c = fipy.CellVariable(mesh=mesh)
+    >>> c.constrain(1.0, where=mesh.facesBottom)
+    >>> fipy.DiffusionTerm(coeff=1.0).solve(var=c, solver=PoreSolver(tolerance=1e-12))
+    >>> bool(np.allclose(c.value, 1.0))
+    True
+    """
+
+    def __init__(self, tolerance: float = TOLERANCE, iterations: int = 1000, **_: object):
+        if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
+            raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
+        super().__init__(tolerance=tolerance, iterations=iterations, criterion="unscaled", precon=None)
+        self._kept: list[tuple[Any, _Symmetric | _General]] = []
+
+    def _solve_(self, L: Any, x: np.ndarray, b: np.ndarray) -> np.ndarray:  # FiPy's names
+        matrix = sp.csr_array(L)
+        ready = self._factored(matrix)
+        x = np.ascontiguousarray(x, float)
+        if not (np.isfinite(b).all() and np.isfinite(x).all()):
+            raise ComputationError("the right-hand side, or the value that the variable has, is not finite")
+        x, iterations = ready.solve(ready.sign * np.asarray(b, float), x, self.tolerance, self.iterations)
+        lost, flow, floor = ready.imbalance(ready.sign * b, x)
+        if not lost <= max(self.tolerance * flow, floor):
+            raise ComputationError(
+                f"the solver stopped after {iterations} iterations with Σ|b - A x| at {_ratio(lost, flow):.1e} of the "
+                f"flow (asked: {self.tolerance:.1e}); try smaller time steps, or FiPy's LinearLUSolver"
+            )
+        self._setConvergence(suite="scipy", code=0, iterations=iterations, residual=lost, tolerance_scale=flow)
+        return x
+
+    def _factored(self, matrix: Any) -> _Symmetric | _General:
+        """The matrix made ready, or what is kept of it."""
+        for kept, ready in self._kept:
+            if (
+                kept.nnz == matrix.nnz
+                and np.array_equal(kept.indptr, matrix.indptr)
+                and np.array_equal(kept.indices, matrix.indices)
+                and np.array_equal(kept.data, matrix.data)
+            ):
+                return ready
+        if not np.isfinite(matrix.data).all():
+            raise ComputationError("the matrix of the equation is not finite: look at its coefficients")
+        ready = _made_ready(matrix.copy())
+        self._kept = [(matrix.copy(), ready), *self._kept[: KEPT - 1]]
+        return ready
+
+    def _canSolveAsymmetric(self) -> bool:
+        return True
+
+
+def _ratio(lost: float, flow: float) -> float:
+    return lost / flow if flow > 0.0 else np.inf
+
+
+def _made_ready(matrix: Any) -> _Symmetric | _General:
+    matrix.sum_duplicates()
+    diagonal = matrix.diagonal()
+    sign = -1.0 if diagonal.sum() < 0.0 else 1.0
+    matrix, diagonal = sign * matrix, sign * diagonal
+    off = sp.csr_array(matrix - sp.diags_array(diagonal))
+    off.eliminate_zeros()
+    sums = matrix.sum(axis=1)
+    m_matrix = (diagonal > 0.0).all() and (off.data <= 0.0).all() and (sums >= -ROUNDING * diagonal).all()
+    difference = abs(off - off.T)
+    if m_matrix and (difference.nnz == 0 or difference.max() <= ROUNDING * abs(off).max()):
+        return _Symmetric(matrix, off, np.where(sums > ROUNDING * diagonal, sums, 0.0), sign)
+    return _General(matrix, sign)
+
+
+def _ensure_determined(matrix: Any, leaks: np.ndarray) -> None:
+    """ComputationError if some part of the unknowns is joined to nothing that is known."""
+    count, part = connected_components(matrix, directed=False)
+    leaking = np.bincount(part, np.abs(leaks), count) > 0.0
+    if not leaking.all():
+        members = np.flatnonzero(~leaking[part])
+        raise ComputationError(
+            f"{counted(len(members), 'unknown')} of {len(part)}, the first of them {members[0]}, "
+            f"{'is' if len(members) == 1 else 'are'} determined up to a constant only: no value, no outflow, no sink "
+            "and no time step ties them down. Constrain the variable on a wall, or add a TransientTerm"
+        )
+
+
+class _Symmetric:
+    """A symmetric M-matrix, as the network that it is."""
+
+    def __init__(self, matrix: Any, off: Any, leaks: np.ndarray, sign: float):
+        _ensure_determined(matrix, leaks)
+        self.sign = sign
+        links = sp.csr_array(-0.5 * (off + off.T))
+        links.sort_indices()
+        weights = np.ascontiguousarray(links.data)
+        self._network = Network(
+            links.indptr.astype(np.int64), links.indices.astype(np.int32), weights, np.ascontiguousarray(leaks),
+            leaks + links.sum(axis=1),
+        )  # fmt: skip
+
+    @cached_property
+    def _factor(self) -> DirectFactor | ApproximateCholesky:
+        network = self._network
+        return DirectFactor(network) if len(network) <= DIRECT_LIMIT else ApproximateCholesky.of(network)
+
+    def solve(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
+        x, iterations = conjugate_gradients(self._network, b, self._factor, tolerance, x)
+        error = np.empty(len(x))
+        self._factor.apply(np.abs(self._network.residual(b, x)), error)
+        accuracy = PRESSURE_TOLERANCE * max(float(np.ptp(x)), np.finfo(float).tiny)
+        if error.max() <= accuracy:
+            return x, iterations
+        # Unknowns behind nearly closed faces may be far from their values while next to nothing is lost.
+        leaks = self._network.leaks
+        held = np.divide(b, leaks, out=np.zeros(len(b)), where=leaks > 0.0)
+        sources = np.where(leaks > 0.0, 0.0, b)
+        found = refined(self._network, held, sources, self._factor, tolerance, accuracy)
+        return found.x + found.rest, iterations + found.iterations
+
+    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+        """Σ|b - A x|, the flow, and what rounding of x alone may lose."""
+        network = self._network
+        lost = float(np.abs(network.residual(b, x)).sum())
+        flow = 0.5 * float(np.abs(network.leaks * x - b).sum())
+        return lost, flow, 2.0 * _EPSILON * float((network.diagonal * np.abs(x)).sum())
+
+
+class _General:
+    """Any other matrix: a sparse factor, or an incomplete one and BiCGStab."""
+
+    def __init__(self, matrix: Any, sign: float):
+        self.sign = sign
+        self._matrix = matrix
+        self._sizes = abs(matrix)
+        self._leaks = matrix.sum(axis=0)
+        empty = np.flatnonzero(self._sizes.sum(axis=1) == 0.0)
+        if len(empty):
+            raise ComputationError(
+                f"nothing determines {counted(len(empty), 'unknown')} of {matrix.shape[0]}, the first of them "
+                f"{empty[0]}: its row of the matrix is empty"
+            )
+        self._direct = matrix.shape[0] <= FACTOR_LIMIT
+
+    @cached_property
+    def _factor(self) -> SuperLU:
+        if self._direct:
+            return self._lu(diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        return spilu(
+            self._matrix.tocsc(), drop_tol=DROP, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )  # fmt: skip
+
+    @cached_property
+    def _pivoted(self) -> SuperLU:
+        """A factor with partial pivoting, for matrices that are not diagonally dominant."""
+        return self._lu(permc_spec="COLAMD")
+
+    def _lu(self, **options: Any) -> SuperLU:
+        try:
+            return splu(self._matrix.tocsc(), **options)
+        except RuntimeError:
+            raise ComputationError(
+                "the matrix of the equation is singular: some unknowns are not determined. Constrain the variable, or "
+                "add a TransientTerm"
+            ) from None
+
+    def solve(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
+        first = self._by_factor if self._direct else self._by_iteration
+        x, iterations = first(b, x, tolerance, limit)
+        if not self._enough(b, x, tolerance):
+            x, more = self._refine(b, x, tolerance, self._pivoted)
+            iterations += more
+        return x, iterations
+
+    def _by_factor(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
+        return self._refine(b, self._factor.solve(b), tolerance, self._factor)
+
+    def _refine(self, b: np.ndarray, x: np.ndarray, tolerance: float, factor: SuperLU) -> tuple[np.ndarray, int]:
+        """Corrections by a factor until the tolerance is met, or rounding allows no more; at least one."""
+        best, least, count = x, np.inf, 0
+        while count < _CORRECTIONS:
+            count += 1
+            x = x + factor.solve(b - self._matrix @ x)
+            lost = float(np.abs(b - self._matrix @ x).sum())
+            if not lost < 0.5 * least:
+                break
+            best, least = x, lost
+            if self._enough(b, x, 0.01 * tolerance):
+                break
+        return best, count
+
+    def _by_iteration(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
+        preconditioner = LinearOperator(self._matrix.shape, self._factor.solve)
+        done = [0]
+
+        def count(_: np.ndarray) -> None:
+            done[0] += 1
+
+        before = np.inf
+        for _ in range(_RESTARTS):
+            r = b - self._matrix @ x
+            lost, flow, floor = self.imbalance(b, x)
+            target = max(tolerance * flow, floor)
+            if lost <= target or not lost < 0.9 * before or done[0] >= limit:
+                break
+            before = lost
+            # What is lost is a sum over the unknowns, of which BiCGStab's norm knows the root of the squares.
+            part = max(0.5 * target / lost, 1e-12) / np.sqrt(len(b)) * lost / np.linalg.norm(r)
+            dx, _code = bicgstab(
+                self._matrix, r, rtol=part, atol=0.0, maxiter=limit - done[0], M=preconditioner, callback=count
+            )
+            if not np.isfinite(dx).all():
+                break
+            x = x + dx
+        return x, done[0]
+
+    def _enough(self, b: np.ndarray, x: np.ndarray, tolerance: float) -> bool:
+        lost, flow, floor = self.imbalance(b, x)
+        return bool(lost <= max(tolerance * flow, floor))
+
+    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+        """Σ|b - A x|, the flow, and what rounding of x alone may lose."""
+        lost = float(np.abs(b - self._matrix @ x).sum())
+        flow = 0.5 * float(np.abs(self._leaks * x - b).sum())
+        return lost, flow, 2.0 * _EPSILON * float((self._sizes @ np.abs(x)).sum())

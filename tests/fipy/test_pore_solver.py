@@ -1,0 +1,143 @@
+"""PoreSolver: the answers of a direct solver, whatever the units, and errors where there is no answer."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse.linalg import spsolve
+
+from porefv.errors import ComputationError, InputError
+from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.walls import Walls
+
+fipy = pytest.importorskip("fipy")
+pore_solver = pytest.importorskip("porefv.fipy.pore_solver")
+PoreSolver = pore_solver.PoreSolver
+
+
+@pytest.fixture
+def fluid(mesh_of):
+    return PoreFlow(mesh_of("n54_s1"), Walls.along("y"), tolerance=1e-13).to_fipy()
+
+
+def solute(fluid):
+    c = fipy.CellVariable(mesh=fluid.mesh, name="c", hasOld=True)
+    c.constrain(1.0, where=fluid.inlet)
+    c.faceGrad.constrain(np.zeros((3, 1)), where=fluid.outlet)
+    return c
+
+
+EQUATIONS = {
+    "diffusion in time": lambda fluid: fipy.TransientTerm() == fipy.DiffusionTerm(coeff=0.1),
+    "convection": lambda fluid: fipy.UpwindConvectionTerm(coeff=fluid.velocity) == fipy.DiffusionTerm(coeff=1e-4),
+    "power law in time": lambda fluid: fipy.TransientTerm() + fipy.PowerLawConvectionTerm(coeff=fluid.velocity)
+    == fipy.DiffusionTerm(coeff=0.1),
+    "sink": lambda fluid: fipy.DiffusionTerm(coeff=0.1) == fipy.ImplicitSourceTerm(coeff=2.0),
+    "fourth order": lambda fluid: fipy.TransientTerm() == -fipy.DiffusionTerm(coeff=(1e-4, 1.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-12, 1e12])
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_the_answer_is_that_of_a_direct_solver(name, scale, fluid, assembled):
+    c = solute(fluid)
+    equation = scale * EQUATIONS[name](fluid)
+    matrix, right = assembled(equation, c, dt=0.1)
+    solver = PoreSolver(tolerance=1e-12)
+    equation.solve(var=c, dt=0.1, solver=solver)
+    assert_allclose(c.value, spsolve(matrix.tocsc(), right), rtol=0, atol=1e-9)
+    assert solver.convergence.iterations >= 0
+
+
+@pytest.mark.parametrize("limit", [0, 20_000])
+def test_iteration_and_factor_agree(limit, fluid, monkeypatch):
+    monkeypatch.setattr(pore_solver, "FACTOR_LIMIT", limit)
+    c = solute(fluid)
+    c.setValue(0.0)
+    for _ in range(3):
+        c.updateOld()
+        EQUATIONS["power law in time"](fluid).solve(var=c, dt=1.0, solver=PoreSolver(tolerance=1e-12))
+    age = solute(fluid)
+    EQUATIONS["convection"](fluid).solve(var=age, solver=PoreSolver(tolerance=1e-12))
+    assert_allclose(age.value, 1.0, atol=1e-9)
+    assert 0.0 <= c.value.min() < c.value.max() <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("limit", [0, 2000])
+def test_conjugate_gradients_and_factor_agree(limit, fluid, monkeypatch):
+    monkeypatch.setattr(pore_solver, "DIRECT_LIMIT", limit)
+    assert_allclose(fluid.solve(solver=PoreSolver()), fluid.flow.pressure, atol=1e-7)
+
+
+def test_a_factor_is_kept_while_the_matrix_stays(fluid, monkeypatch):
+    made = []
+    splu = pore_solver.splu
+    monkeypatch.setattr(pore_solver, "splu", lambda *args, **options: made.append(1) or splu(*args, **options))
+    c, equation, solver = solute(fluid), EQUATIONS["power law in time"](fluid), PoreSolver()
+    for _ in range(4):
+        c.updateOld()
+        equation.solve(var=c, dt=0.1, solver=solver)
+    assert len(made) == 1
+    equation.solve(var=c, dt=0.2, solver=solver)
+    equation.solve(var=c, dt=0.1, solver=solver)
+    assert len(made) == 2
+
+
+def test_a_time_step_that_changes_little_is_solved(fluid):
+    """FiPy's default criterion leaves such steps as they are, for values on walls swell the right-hand side."""
+    pressure = fluid.pressure
+    pressure.setValue(0.5)
+    equation = fipy.TransientTerm(coeff=1e-3) == fipy.DiffusionTerm(coeff=fluid.mobility)
+    for _ in range(60):
+        equation.solve(var=pressure, dt=1.0)
+    assert_allclose(pressure.value, fluid.flow.pressure, atol=1e-7)
+
+
+def test_what_is_not_determined_is_an_error(fluid):
+    c, infinite = (fipy.CellVariable(mesh=fluid.mesh, value=value) for value in (1.0, np.inf))
+    with pytest.raises(ComputationError, match=f"{fluid.mesh.numberOfCells} unknowns of .* up to a constant only"):
+        (fipy.DiffusionTerm(coeff=1.0) == 1.0).solve(var=c)
+    assert (c.value == 1.0).all()
+    with pytest.raises(ComputationError, match="matrix of the equation is not finite"):
+        fipy.DiffusionTerm(coeff=np.nan).solve(var=c)
+    with np.errstate(all="ignore"), pytest.raises(ComputationError, match="not finite"):
+        (fipy.TransientTerm() == fipy.DiffusionTerm(coeff=1.0)).solve(var=infinite, dt=1.0)
+    with pytest.raises(ComputationError, match="nothing determines"):
+        (fipy.ImplicitSourceTerm(coeff=0.0) == 1.0).solve(var=c)
+    assert (c.value == 1.0).all()
+
+
+def test_a_tolerance_that_is_none_is_refused():
+    for tolerance in (0.0, 1.0, -1e-3, "small"):
+        with pytest.raises(InputError, match="tolerance must lie between 0 and 1"):
+            PoreSolver(tolerance=tolerance)
+
+
+def test_pores_behind_nearly_closed_faces_have_their_values(fluid):
+    """What they lose is nothing beside the flow; their values are solved for all the same."""
+    mesh = fluid.mesh
+    diffusivity = fipy.FaceVariable(mesh=mesh, value=1.0)
+    alone = int(np.flatnonzero(mesh.pore_mesh.pore_walls == 0)[0])
+    around = (np.asarray(mesh.faceCellIDs) == alone).any(axis=0) & mesh.interiorFaces.value
+    diffusivity.setValue(1e-14, where=around)
+    c = fipy.CellVariable(mesh=mesh, value=5.0)
+    c.constrain(1.0, where=mesh.facesBottom)
+    c.constrain(0.0, where=mesh.facesTop)
+    for limit in (0, 2000):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(pore_solver, "DIRECT_LIMIT", limit)
+            c.setValue(5.0)
+            fipy.DiffusionTerm(coeff=diffusivity).solve(var=c, solver=PoreSolver())
+            assert 0.0 < c.value[alone] < 1.0
+
+
+def test_sweeps_end_where_what_enters_leaves(fluid):
+    """A diffusivity 1 + c."""
+    mesh = fluid.mesh
+    c = fipy.CellVariable(mesh=mesh)
+    c.constrain(1.0, where=mesh.facesBottom)
+    c.constrain(0.0, where=mesh.facesTop)
+    equation = fipy.DiffusionTerm(coeff=1.0 + c.faceValue)
+    residuals = [equation.sweep(var=c) for _ in range(40)]
+    assert residuals[-1] < 1e-7 * residuals[0]
+    flux = -(1.0 + c.faceValue) * c.faceGrad
+    assert mesh.through(flux, mesh.facesTop) == pytest.approx(-mesh.through(flux, mesh.facesBottom), rel=1e-6)
