@@ -29,6 +29,7 @@ GIVES = {
     "conductance": "flow of a throat: models",
     "solvers": "pressures of a network",
     "flow": "pressure, fluxes, forces",
+    "transport": "diffusion in the pores",
     "fipy": "the fluid as a FiPy mesh",
     "dem": "grains that move",
     "coupling": "grains and fluid together",
@@ -43,7 +44,8 @@ GIVES = {
 GROUPS = {
     "errors": "#e6e6e6", "system": "#e6e6e6",
     "packing": "#fbe3c0", "tessellation": "#fbe3c0", "mesh": "#fbe3c0",
-    "conductance": "#cfe3f5", "solvers": "#cfe3f5", "flow": "#cfe3f5", "fipy": "#cfe3f5",
+    "conductance": "#cfe3f5", "solvers": "#cfe3f5", "flow": "#cfe3f5", "transport": "#cfe3f5",
+    "fipy": "#cfe3f5",
     "dem": "#d8ecd0", "coupling": "#d8ecd0",
     "export": "#eadcf0", "results": "#eadcf0", "scenes": "#eadcf0", "simulation": "#eadcf0",
     "resolved": "#f5d5d5", "comparison": "#f5d5d5", "cli": "#e6e6e6",

@@ -115,10 +115,9 @@ class PoreMesh(CellMesh):
     def pore_surfaces(self) -> np.ndarray:
         """(n_pores,): surface of the grains in each pore, without what other grains and walls cover [m²].
 
-        They add up to the wetted surface of the packing, whatever the overlap. Each value is exact where no sphere
-        reaches through the facet opposite to its centre. Without overlap none is negative. With overlap, what is
-        covered outside a cell counts against it, as in `cell_void_volumes`: single flat cells may have less than
-        nothing, and a neighbour as much more.
+        They add up to the surface of the union of the spheres within the box. Without overlap none is negative. With
+        overlap, caps that reach out of a cell count against it, as in `cell_void_volumes`: single flat cells may have
+        less than nothing, and a neighbour as much more (docs/theory.md, Surfaces of pores).
         """
         return np.bincount(self.cell_pore, self.cell_surfaces, self.n_pores)
 
