@@ -66,7 +66,11 @@ def pressure(flow, fluid, lu):
         "`LinearPCGSolver`, 1e-14, Jacobi": lambda: fipy.LinearPCGSolver(
             tolerance=1e-14, precon=fipy.JacobiPreconditioner(), iterations=5000
         ),
+        "`LinearPCGSolver`, FiPy's tolerance, ILU": lambda: fipy.LinearPCGSolver(precon=fipy.ILUPreconditioner()),
         "`LinearGMRESSolver`, FiPy's tolerance": lambda: fipy.LinearGMRESSolver(),
+        "`LinearBicgstabSolver`, 1e-14, ILU": lambda: fipy.LinearBicgstabSolver(
+            tolerance=1e-14, precon=fipy.ILUPreconditioner()
+        ),
     }
     if lu:
         others["`LinearLUSolver`, FiPy's default"] = lambda: fipy.LinearLUSolver(tolerance=1e-14, criterion="RHS")

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import spsolve
 
-from porefv.errors import ComputationError, InputError
+from porefv.errors import ComputationError, InputError, PorefvWarning
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 
@@ -141,3 +141,98 @@ def test_sweeps_end_where_what_enters_leaves(fluid):
     assert residuals[-1] < 1e-7 * residuals[0]
     flux = -(1.0 + c.faceValue) * c.faceGrad
     assert mesh.through(flux, mesh.facesTop) == pytest.approx(-mesh.through(flux, mesh.facesBottom), rel=1e-6)
+
+
+def grid_variable(grid):
+    c = fipy.CellVariable(mesh=grid)
+    c.constrain(1.0, where=grid.facesLeft)
+    c.constrain(0.0, where=grid.facesRight)
+    return c
+
+
+@pytest.mark.filterwarnings("error::porefv.errors.PorefvWarning")
+@pytest.mark.parametrize("scale", [1.0, 1e-12, 1e12])
+@pytest.mark.parametrize("shape", [(30, 20), (15, 10, 8)])
+def test_the_answer_on_grids_of_fipys_own(shape, scale, assembled, monkeypatch):
+    grid = (fipy.Grid2D if len(shape) == 2 else fipy.Grid3D)(*([1.0] * len(shape)), *shape)
+    velocity = [1000.0] + [300.0] * (len(shape) - 1)
+    for limit in (0, 20_000):
+        monkeypatch.setattr(pore_solver, "FACTOR_LIMIT", limit)
+        monkeypatch.setattr(pore_solver, "DIRECT_LIMIT", limit)
+        for equation in (
+            fipy.DiffusionTerm(coeff=scale) == -3.0 * scale,
+            fipy.PowerLawConvectionTerm(coeff=[scale * v for v in velocity]) == fipy.DiffusionTerm(coeff=scale),
+            fipy.TransientTerm(coeff=scale) == fipy.DiffusionTerm(coeff=scale),
+            fipy.TransientTerm(coeff=scale) == -fipy.DiffusionTerm(coeff=(scale, 1.0)),
+        ):
+            c = grid_variable(grid)
+            matrix, right = assembled(equation, c, dt=0.1)
+            equation.solve(var=c, dt=0.1, solver=PoreSolver(tolerance=1e-12))
+            expected = spsolve(matrix.tocsc(), right)
+            assert_allclose(c.value, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("limit", [0, 20_000])
+def test_coupled_equations_have_the_answer_of_fipys_solver(limit, monkeypatch):
+    monkeypatch.setattr(pore_solver, "FACTOR_LIMIT", limit)
+    grid = fipy.Grid2D(nx=12, ny=10)
+    found = []
+    for solver in (PoreSolver(tolerance=1e-12), fipy.LinearLUSolver(tolerance=1e-14)):
+        a, b = grid_variable(grid), grid_variable(grid)
+        first = fipy.TransientTerm(var=a) == fipy.DiffusionTerm(1.0, var=a) - fipy.ImplicitSourceTerm(2.0, var=b)
+        second = fipy.TransientTerm(var=b) == fipy.DiffusionTerm(3.0, var=b) + fipy.ImplicitSourceTerm(1.0, var=a)
+        (first & second).solve(dt=1.0, solver=solver)
+        found.append(np.concatenate([a.value, b.value]))
+    assert_allclose(found[0], found[1], rtol=0, atol=1e-9)
+
+
+def test_sweeps_return_the_residuals_of_fipy():
+    grid, residuals = fipy.Grid2D(nx=8, ny=8), []
+    for solver in (PoreSolver(), fipy.LinearLUSolver(tolerance=1e-12)):
+        c, equation = grid_variable(grid), fipy.DiffusionTerm(coeff=1.0)
+        residuals.append([equation.sweep(var=c, solver=solver, underRelaxation=0.5) for _ in range(3)])
+        assert equation.sweep(var=c, solver=solver, residualFn=lambda *_: 7.0) == 7.0
+    assert_allclose(residuals[0], residuals[1], rtol=1e-7)
+
+
+@pytest.mark.parametrize("limit", [0, 20_000])
+def test_convection_in_a_closed_box_is_not_determined(limit, monkeypatch):
+    monkeypatch.setattr(pore_solver, "FACTOR_LIMIT", limit)
+    grid = fipy.Grid2D(nx=8, ny=8)
+    velocity = fipy.FaceVariable(mesh=grid, rank=1, value=[[1.0], [0.0]])
+    velocity.setValue(0.0, where=grid.exteriorFaces)
+    equation = fipy.PowerLawConvectionTerm(coeff=velocity) == fipy.DiffusionTerm(coeff=1.0) + 1.0
+    with pytest.raises(ComputationError, match="64 unknowns of 64, .* up to a constant only"):
+        equation.solve(var=fipy.CellVariable(mesh=grid), solver=PoreSolver())
+
+
+def test_too_few_iterations_are_an_error_and_a_slower_way_is_told(monkeypatch):
+    monkeypatch.setattr(pore_solver, "FACTOR_LIMIT", 0)
+    monkeypatch.setattr(pore_solver, "DIRECT_LIMIT", 0)
+    grid = fipy.Grid2D(nx=40, ny=40)
+    c = grid_variable(grid)
+    with pytest.raises(ComputationError, match="stopped after 1 iterations"):
+        fipy.DiffusionTerm(coeff=1.0).solve(var=c, solver=PoreSolver(iterations=1))
+    equation = fipy.CentralDifferenceConvectionTerm(coeff=[1.0, 0.3]) == fipy.DiffusionTerm(coeff=1.0)
+    with pytest.warns(PorefvWarning, match="BiCGStab did not reach"):
+        equation.solve(var=c, solver=PoreSolver(tolerance=1e-12, iterations=1))
+
+
+def test_several_processes_are_refused():
+    class Communicator:
+        Nproc = 2
+
+    grid = fipy.Grid2D(nx=3, ny=3)
+    c = grid_variable(grid)
+    grid.communicator = Communicator()
+    with pytest.raises(InputError, match="solves in one process, and there are 2"):
+        fipy.DiffusionTerm(coeff=1.0).solve(var=c, solver=PoreSolver())
+
+
+def test_fipys_defaults_are_replaced_within_a_block_only():
+    c = grid_variable(fipy.Grid2D(nx=3, ny=3))
+    equations = fipy.DiffusionTerm(), fipy.PowerLawConvectionTerm(coeff=[1.0, 0.0])
+    before = [type(equation.getDefaultSolver(var=c)) for equation in equations]
+    with pore_solver.use_pore_solver() as solver:
+        assert all(equation.getDefaultSolver(var=c) is solver for equation in equations)
+    assert [type(equation.getDefaultSolver(var=c)) for equation in equations] == before

@@ -7,6 +7,9 @@ what passes through them, and has an error where that is not small.
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +18,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, SuperLU, bicgstab, spilu, splu
 
-from porefv.errors import ComputationError, InputError, counted
+from porefv.errors import ComputationError, InputError, PorefvWarning, counted
 from porefv.fipy.fipy_import import load_fipy
 from porefv.solvers.approximate_cholesky import ApproximateCholesky
 from porefv.solvers.conjugate_gradients import conjugate_gradients, refined
@@ -53,7 +56,7 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
         Largest Σ|b - A x|, relative to the flow: half of what enters and leaves the unknowns, ½ Σ|e x - b| with e the
         sums of the matrix's columns.
     iterations : int
-        Most iterations.
+        Most iterations. Where BiCGStab needs more, a warning (`PorefvWarning`) says so, and the matrix is factored.
 
     Raises
     ------
@@ -79,6 +82,16 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
         super().__init__(tolerance=tolerance, iterations=iterations, criterion="unscaled", precon=None)
         self._kept: list[tuple[Any, _Symmetric | _General]] = []
 
+    @property
+    def _Lxb(self) -> Any:  # FiPy's name
+        processes = self.var.mesh.communicator.Nproc
+        if processes > 1:
+            raise InputError(
+                f"PoreSolver solves in one process, and there are {processes}: every one of them would solve the whole "
+                "problem. Start Python without mpirun"
+            )
+        return super()._Lxb
+
     def _solve_(self, L: Any, x: np.ndarray, b: np.ndarray) -> np.ndarray:  # FiPy's names
         matrix = sp.csr_array(L)
         ready = self._factored(matrix)
@@ -92,7 +105,10 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
                 f"the solver stopped after {iterations} iterations with Σ|b - A x| at {_ratio(lost, flow):.1e} of the "
                 f"flow (asked: {self.tolerance:.1e}); try smaller time steps, or FiPy's LinearLUSolver"
             )
-        self._setConvergence(suite="scipy", code=0, iterations=iterations, residual=lost, tolerance_scale=flow)
+        unit = abs(ready.sign)
+        self._setConvergence(
+            suite="scipy", code=0, iterations=iterations, residual=lost / unit, tolerance_scale=flow / unit
+        )
         return x
 
     def _factored(self, matrix: Any) -> _Symmetric | _General:
@@ -113,6 +129,36 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
 
     def _canSolveAsymmetric(self) -> bool:
         return True
+
+
+@contextmanager
+def use_pore_solver(tolerance: float = TOLERANCE) -> Iterator[PoreSolver]:
+    """Within a `with` block, FiPy's equations on any mesh are solved by a PoreSolver unless another is named.
+
+    Equations on a `FluidMesh` are so without. Replaces `fipy.solvers.DefaultSolver` and `DefaultAsymmetricSolver` of
+    the whole process, and puts them back on leaving the block.
+
+    Examples
+    --------
+    >>> import fipy
+    >>> grid = fipy.Grid1D(nx=4)
+    >>> c = fipy.CellVariable(mesh=grid)
+    >>> c.constrain(1.0, where=grid.facesLeft)
+    >>> with use_pore_solver() as solver:
+    ...     fipy.DiffusionTerm(coeff=1.0).solve(var=c)
+    >>> bool(np.allclose(c.value, 1.0))
+    True
+    """
+    solver = PoreSolver(tolerance)
+    names = ("DefaultSolver", "DefaultAsymmetricSolver")
+    before = {name: getattr(fipy.solvers, name) for name in names}
+    for name in names:
+        setattr(fipy.solvers, name, lambda *_, **__: solver)
+    try:
+        yield solver
+    finally:
+        for name, value in before.items():
+            setattr(fipy.solvers, name, value)
 
 
 def _ratio(lost: float, flow: float) -> float:
@@ -167,7 +213,9 @@ class _Symmetric:
         return DirectFactor(network) if len(network) <= DIRECT_LIMIT else ApproximateCholesky.of(network)
 
     def solve(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
-        x, iterations = conjugate_gradients(self._network, b, self._factor, tolerance, x)
+        x, iterations = conjugate_gradients(self._network, b, self._factor, tolerance, x, limit)
+        if iterations >= limit:
+            return x, iterations
         error = np.empty(len(x))
         self._factor.apply(np.abs(self._network.residual(b, x)), error)
         accuracy = PRESSURE_TOLERANCE * max(float(np.ptp(x)), np.finfo(float).tiny)
@@ -192,17 +240,24 @@ class _General:
     """Any other matrix: a sparse factor, or an incomplete one and BiCGStab."""
 
     def __init__(self, matrix: Any, sign: float):
-        self.sign = sign
-        self._matrix = matrix
         self._sizes = abs(matrix)
-        self._leaks = matrix.sum(axis=0)
         empty = np.flatnonzero(self._sizes.sum(axis=1) == 0.0)
         if len(empty):
             raise ComputationError(
                 f"nothing determines {counted(len(empty), 'unknown')} of {matrix.shape[0]}, the first of them "
                 f"{empty[0]}: its row of the matrix is empty"
             )
+        # Sizes near 1: SciPy's BiCGStab takes products below 1e-32 for a breakdown, whatever the units.
+        scale = 2.0 ** -float(np.rint(np.log2(self._sizes.max())))
+        self.sign = sign * scale
+        self._matrix, self._sizes = scale * matrix, scale * self._sizes
+        self._leaks = self._matrix.sum(axis=0)
+        # Where all columns of a part sum to nothing, nothing leaves it; where all rows do, constants are solutions.
+        for axis in (0, 1):
+            sums = self._matrix.sum(axis=axis)
+            _ensure_determined(matrix, np.where(np.abs(sums) > ROUNDING * self._sizes.sum(axis=axis), sums, 0.0))
         self._direct = matrix.shape[0] <= FACTOR_LIMIT
+        self._insufficient = False
 
     @cached_property
     def _factor(self) -> SuperLU:
@@ -228,12 +283,23 @@ class _General:
             ) from None
 
     def solve(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
-        first = self._by_factor if self._direct else self._by_iteration
-        x, iterations = first(b, x, tolerance, limit)
-        if not self._enough(b, x, tolerance):
-            x, more = self._refine(b, x, tolerance, self._pivoted)
-            iterations += more
-        return x, iterations
+        iterations = 0
+        if not self._insufficient:
+            first = self._by_factor if self._direct else self._by_iteration
+            x, iterations = first(b, x, tolerance, limit)
+            if self._enough(b, x, tolerance):
+                return x, iterations
+            self._insufficient = True
+            if not self._direct:
+                warnings.warn(
+                    f"BiCGStab did not reach a tolerance of {tolerance:.1e} in {iterations} iterations: the matrix of "
+                    f"{counted(len(b), 'unknown')} is factored, which takes longer. Smaller time steps, or upwind in "
+                    "place of central differences, make it easier",
+                    PorefvWarning,
+                    stacklevel=2,
+                )
+        x, more = self._refine(b, x, tolerance, self._pivoted)
+        return x, iterations + more
 
     def _by_factor(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
         return self._refine(b, self._factor.solve(b), tolerance, self._factor)
@@ -268,13 +334,13 @@ class _General:
                 break
             before = lost
             # What is lost is a sum over the unknowns, of which BiCGStab's norm knows the root of the squares.
-            part = max(0.5 * target / lost, 1e-12) / np.sqrt(len(b)) * lost / np.linalg.norm(r)
+            part = max(0.5 * target / lost, 1e-12) / np.sqrt(len(b)) * lost / (size := float(np.linalg.norm(r)))
             dx, _code = bicgstab(
-                self._matrix, r, rtol=part, atol=0.0, maxiter=limit - done[0], M=preconditioner, callback=count
+                self._matrix, r / size, rtol=part, atol=0.0, maxiter=limit - done[0], M=preconditioner, callback=count
             )
             if not np.isfinite(dx).all():
                 break
-            x = x + dx
+            x = x + size * dx
         return x, done[0]
 
     def _enough(self, b: np.ndarray, x: np.ndarray, tolerance: float) -> bool:

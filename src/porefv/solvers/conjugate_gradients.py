@@ -132,6 +132,7 @@ def conjugate_gradients(
     preconditioner: Preconditioner,
     tolerance: float,
     guess: np.ndarray | None = None,
+    limit: int | None = None,
 ) -> tuple[np.ndarray, int]:
     """Iterate until Σ|b - A x| is below `tolerance` times the flow, or rounding allows no better.
 
@@ -145,12 +146,15 @@ def conjugate_gradients(
     tolerance : float
     guess : (n,) float64 array, optional
         Pressures where iterations start, zero by default; they are copied [Pa].
+    limit : int, optional
+        Most iterations, `MAX_ITERATIONS` by default.
 
     Returns
     -------
     x (n,), number of iterations
     """
     x = np.zeros(len(network)) if guess is None else guess.copy()
+    limit = MAX_ITERATIONS if limit is None else limit
 
     def enough() -> float:
         flow, floor = _measures(network, rhs, x)
@@ -163,11 +167,11 @@ def conjugate_gradients(
         r = network.residual(rhs, x)
         lost = float(np.abs(r).sum())
         flow, floor = _measures(network, rhs, x)
-        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= MAX_ITERATIONS:
+        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= limit:
             return x, iterations
         before = lost
         rule = _ImbalanceRule(0.0, enough)
-        iterations += preconditioned_cg(network, preconditioner, x, r, rule, MAX_ITERATIONS - iterations)[0]
+        iterations += preconditioned_cg(network, preconditioner, x, r, rule, limit - iterations)[0]
 
 
 class _ImbalanceRule:
