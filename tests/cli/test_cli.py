@@ -438,3 +438,28 @@ def test_free_space_is_told_and_taken_away(tmp_path, capsys):
     scene.write_text(text.format('box = "tight"'))
     assert main(["check", str(scene)]) == 2
     assert "unknown box 'tight'" in capsys.readouterr().err
+
+
+def test_the_command_alone_says_what_to_do_first(capsys):
+    assert main([]) == 0
+    said = capsys.readouterr().out
+    assert "porefv check packing.csv" in said
+    assert max(map(len, said.splitlines())) <= 90
+
+
+def test_a_mistyped_command_gets_a_suggestion(capsys):
+    with pytest.raises(SystemExit):
+        main(["slove", "scene.toml"])
+    assert "did you mean 'solve'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command", ["pack", "solve", "simulate", "reference", "trade", "check", "info", "plot", "export"]
+)
+def test_the_help_of_a_command_has_an_example_and_a_page_that_exists(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    said = capsys.readouterr().out
+    assert f"  porefv {command} " in said
+    page = re.search(r"docs/(\w+\.md)", said)[1]
+    assert (Path(__file__).parents[2] / "docs" / page).is_file()

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from porefv.cli.options import add_command
 from porefv.cli.packing_text import is_packing_file, packing_text
 from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("check", help="validate a scene and its packing, or a packing file, without computing")
+    parser = add_command(
+        commands, "check", "validate a scene and its packing, or a packing file, without computing",
+        "porefv check scene.toml\nporefv check packing.csv", "formats.md",
+    )  # fmt: skip
     parser.add_argument("scene", metavar="SCENE.toml", type=Path, help="scene, or packing file")
     parser.set_defaults(command=run)
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from porefv.cli.options import add_command
 from porefv.cli.text import path_text, say
 
 # As `porefv.results.exporting.FORMATS`, which would be slow to import for the help.
@@ -14,7 +15,10 @@ FORMATS = ("openpnm", "csv", "inp", "mesh", "msh", "nas", "vtk", "vtu")
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("export", help="write pores and throats of results for other programs")
+    parser = add_command(
+        commands, "export", "write pores and throats of results for other programs",
+        "porefv export results --to openpnm --out network.npz", "quantities.md",
+    )  # fmt: skip
     parser.add_argument("results", metavar="RESULTS", type=Path, help="results of porefv solve, with vtk = true")
     parser.add_argument(
         "--to", choices=FORMATS, required=True,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from porefv.cli.options import add_command
 from porefv.cli.packing_text import hidden_row, is_packing_file, packing_text
 from porefv.cli.text import count_text, path_text, range_text, rows_text, say, vector_text, walls_text
 from porefv.errors import InputError
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("info", help="print a summary of results, or of a packing file")
+    parser = add_command(
+        commands, "info", "print a summary of results, or of a packing file",
+        "porefv info results\nporefv info packing.csv", "formats.md",
+    )  # fmt: skip
     parser.add_argument("results", metavar="RESULTS", type=Path, help="results directory, or packing file")
     parser.set_defaults(command=run)
 

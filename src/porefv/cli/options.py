@@ -4,6 +4,18 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
+
+
+def add_command(commands: Any, name: str, summary: str, examples: str, page: str) -> argparse.ArgumentParser:
+    """Add a command; its help ends with examples, one a line, and the page of the documentation that says more."""
+    lines = "\n".join(f"  {line}" for line in examples.splitlines())
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"examples:\n{lines}\n\nMore in the documentation: docs/{page}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    return parser
 
 
 def add_run_options(parser: argparse.ArgumentParser, force: str) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.options import add_run_options
+from porefv.cli.options import add_command, add_run_options
 from porefv.cli.text import say
 from porefv.errors import counted
 
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("pack", help="make a packing of spheres, and write its file")
+    parser = add_command(
+        commands, "pack", "make a packing of spheres, and write its file",
+        "porefv pack packing.toml", "pack.md",
+    )  # fmt: skip
     add_run_options(parser, force="replace a file that exists")
     parser.set_defaults(command=run)
 

@@ -6,15 +6,17 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from porefv.cli.options import add_command
 from porefv.cli.packing_text import is_packing_file
 from porefv.errors import InputError
 
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser(
-        "plot", help="draw results: grains and pores of solve, time series of simulate; or a packing file"
-    )
+    parser = add_command(
+        commands, "plot", "draw results: grains and pores of solve, time series of simulate; or a packing file",
+        "porefv plot results --out picture.png\nporefv plot packing.csv --out packing.png", "quickstart.md",
+    )  # fmt: skip
     parser.add_argument("results", metavar="RESULTS", type=Path, help="results directory, or packing file")
     parser.add_argument("--out", metavar="FILE.png", type=Path, required=True, help="picture to write")
     parser.add_argument(

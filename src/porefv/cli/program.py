@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import signal
 import sys
@@ -19,6 +20,26 @@ from porefv.system import memory
 from porefv.system.signals import ENDING, Terminated, end, handled
 from porefv.system.version import __version__
 
+# What `porefv` alone prints: what to do first.
+_FIRST = """porefv: packings of spheres, the flow through them, and the force on every grain.
+
+With a packing file:
+  porefv check packing.csv                      what is in it, and whether it is fit
+  porefv plot packing.csv --out packing.png     how it looks
+With a scene, which names a packing, what drives the flow and what is wanted:
+  porefv solve scene.toml                       permeability, pressures, forces
+  porefv plot results --out picture.png         a picture of them
+  porefv simulate scene.toml                    grains that move, dry or in a fluid
+
+The smallest scene:
+  packing = "packing.csv"
+  [walls]
+  y_min = { pressure = 1.0 }
+  y_max = { pressure = 0.0 }
+
+porefv --help lists all commands, porefv COMMAND --help says more of one.
+First steps in the documentation: docs/quickstart.md"""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; its exit status: 0, 1 (failed computation), 2 (bad input), 130 (interrupted) or 143 (SIGTERM)."""
@@ -30,7 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     with handled(interrupted, *ENDING):
         try:
-            options = _parser().parse_args(arguments)
+            given = sys.argv[1:] if arguments is None else arguments
+            if not given:
+                say(_FIRST)
+                return 0
+            options = _parser().parse_args(given)
             _check_arguments(options)
             with _warnings_in_a_line(quiet=getattr(options, "quiet", False)):
                 if options.command is not info.run:
@@ -136,6 +161,14 @@ class _CommandParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message, 500))
+
+    def _check_value(self, action: Any, value: Any) -> None:
+        """As argparse, with what is meant where that can be guessed."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            near = difflib.get_close_matches(str(value), known, 1)
+            guess = f"did you mean '{near[0]}'? " if near else ""
+            raise argparse.ArgumentError(action, f"invalid choice: '{value}'; {guess}known: {', '.join(known)}")
 
     def _print_message(self, message: str, file: Any = None) -> None:
         """As argparse, which takes no notice of an output that cannot be written to."""

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.options import add_run_options
+from porefv.cli.options import add_command, add_run_options
 from porefv.cli.text import say
 from porefv.errors import InputError
 
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser(
-        "reference", help="solve a scene by resolved Stokes flow, slow and exact, beside the scene's own method"
-    )
+    parser = add_command(
+        commands, "reference", "solve a scene by resolved Stokes flow, slow and exact, beside its own method",
+        "porefv reference scene.toml\nporefv reference scene.toml --single --mesh-size 1", "reference.md",
+    )  # fmt: skip
     add_run_options(parser, force="replace a file that exists")
     parser.add_argument("--out", metavar="FILE.json", type=Path, help="file to write; by the results directory's name")
     parser.add_argument("--order", type=int, default=3, help="of the velocity's polynomials, 2 to 4 (default 3)")

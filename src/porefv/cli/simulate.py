@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.options import add_run_options
+from porefv.cli.options import add_command, add_run_options
 from porefv.cli.text import path_text, say
 from porefv.errors import InputError, counted
 
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("simulate", help="move grains, dry or in a fluid, through the stages of a scene")
+    parser = add_command(
+        commands, "simulate", "move grains, dry or in a fluid, through the stages of a scene",
+        "porefv simulate scene.toml\nporefv simulate scene.toml --resume", "simulate.md",
+    )  # fmt: skip
     add_run_options(parser, force="replace results that exist")
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
     parser.set_defaults(command=run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from porefv.cli.options import add_run_options
+from porefv.cli.options import add_command, add_run_options
 from porefv.cli.text import axes_text, count_text, path_text, say
 
 if TYPE_CHECKING:
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("solve", help="compute what a scene asks for, and write its results")
+    parser = add_command(
+        commands, "solve", "compute what a scene asks for, and write its results",
+        "porefv solve scene.toml\nporefv solve scene.toml --force --threads 1", "scene.md",
+    )  # fmt: skip
     add_run_options(parser, force="replace results that exist")
     parser.set_defaults(command=run)
 

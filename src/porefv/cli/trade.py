@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
-from porefv.cli.options import add_run_options
+from porefv.cli.options import add_command, add_run_options
 from porefv.cli.text import say
 from porefv.comparison.methods import RESOLVED_UP_TO
-from porefv.errors import printable
 
 
 def register(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("trade", help="what each method costs on a scene, and how far it is off")
+    parser = add_command(
+        commands, "trade", "what each method costs on a scene, and how far it is off",
+        "porefv trade scene.toml\nporefv trade scene.toml --no-resolved --out trade", "trade.md",
+    )  # fmt: skip
     add_run_options(parser, force="replace results that exist")
     parser.add_argument("--out", metavar="DIRECTORY", type=Path, help="table and picture; by the scene's results")
     parser.add_argument(
@@ -32,14 +33,15 @@ def run(options: argparse.Namespace) -> None:
     from porefv.comparison.output import save, table
     from porefv.scenes.flow_scene import FlowScene
     from porefv.system.atomic_files import atomic_directory
+    from porefv.system.progress import Progress
 
     directory = FlowScene.read(options.scene).output.directory
     target = options.out or directory.with_name(f"{directory.name}_trade")
     if options.threads:
         os.environ["NUMBA_NUM_THREADS"] = str(options.threads)
-    report = None if options.quiet else (lambda name: print(printable(f"  {name} ..."), file=sys.stderr, flush=True))
+    progress = Progress(quiet=options.quiet)
     with atomic_directory(target, force=options.force) as folder:
-        found = compare(options.scene, resolved=options.resolved, report=report)
+        found = compare(options.scene, resolved=options.resolved, progress=progress)
         save(found, folder)
     if not options.quiet:
         say(table(found))

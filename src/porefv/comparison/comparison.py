@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -17,6 +16,7 @@ from porefv.errors import InputError, MissingExtraError
 from porefv.resolved.refinement import require_ngsolve
 from porefv.scenes.flow_scene import FlowScene
 from porefv.solvers.solver import DIRECT_LIMIT
+from porefv.system.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,7 @@ class MethodComparison:
         return not any(self.errors(other)[1] < error and other.seconds < result.seconds for other in self.results)
 
 
-def compare(
-    scene_file: Path, *, resolved: bool | None = None, report: Callable[[str], None] | None = None
-) -> MethodComparison:
+def compare(scene_file: Path, *, resolved: bool | None = None, progress: Progress | None = None) -> MethodComparison:
     """Compute a scene by all methods.
 
     Parameters
@@ -60,8 +58,8 @@ def compare(
     resolved : bool, optional
         Whether to compute the resolved Stokes flow; by default for up to `RESOLVED_UP_TO` spheres, if its extra is
         installed.
-    report : function, optional
-        Called with the name of each method before it is computed.
+    progress : Progress, optional
+        Has a stage for each method.
 
     Raises
     ------
@@ -88,10 +86,11 @@ def compare(
         require_ngsolve()
     own = scene.flow.conductance.name
     results = []
-    for method in methods(tuple(MODELS), own, mesh.n_pores > DIRECT_LIMIT, bool(resolved)):
-        if report:
-            report(method.name)
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    chosen = methods(tuple(MODELS), own, mesh.n_pores > DIRECT_LIMIT, bool(resolved))
+    progress = progress or Progress(quiet=True)
+    progress.stages = tuple(method.name for method in chosen)
+    for method in chosen:
+        with progress.stage(method.name), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             results.append(pool.submit(measure, scene_file, method).result())
     reference = results[-1] if resolved else next(found for found in results if found.method.conductance == own)
     return MethodComparison(results, reference, tuple(remarks))

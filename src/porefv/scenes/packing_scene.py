@@ -276,7 +276,7 @@ class PackingScene(Scene):
 
 
 def _state_text(state: PackingState) -> str:
-    return f"{state.stage} {state.stress:.4g} Pa, n {state.porosity:.4f}, unbalanced {state.unbalanced:.0e}"
+    return f"n {state.porosity:.4f}  unbalanced {state.unbalanced:.0e}  {state.stress:.4g} Pa  {state.stage}"
 
 
 def _described(packing: Packing, found: dict[str, str], seed: int) -> Packing:

@@ -14,6 +14,18 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
 
+def fitted(state: str, width: int) -> str:
+    """As many values of a state, set apart by two spaces, as a width has room for; the first ones come first.
+
+    >>> fitted("unbalanced 3e-03  kinetic 1e-05  imbalance 2e-10", 34)
+    'unbalanced 3e-03  kinetic 1e-05'
+    """
+    values = state.split("  ")
+    while len("  ".join(values)) > width:
+        values.pop()
+    return "  ".join(values)
+
+
 class Progress:
     """Stages of a computation.
 
@@ -48,6 +60,7 @@ class Progress:
         self._stream = sys.stderr if stream is None else stream
         self.draws = not quiet and self._stream.isatty()
         self._bar: Bar | None = None  # of the stage that lasts
+        self._fixed = 0  # columns that are taken by all but the state
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -58,8 +71,8 @@ class Progress:
                 yield
                 return
             # A compiled kernel may hold the interpreter's lock: the line then stands still, but it stands.
-            with self._new_bar() as self._bar:
-                title = f"{self.stages.index(name) + 1}/{len(self.stages)} {name}" if name in self.stages else name
+            title = f"{self.stages.index(name) + 1}/{len(self.stages)} {name}" if name in self.stages else name
+            with self._new_bar(title) as self._bar:
                 self._bar.add_task(title, total=None, state="")
                 try:
                     yield
@@ -69,6 +82,7 @@ class Progress:
     def show(self, state: str, part: float | None = None) -> None:
         """Show what is known of the stage that lasts, and which part of it is done if that is known."""
         if self._bar is not None:
+            state = fitted(state, self._bar.console.width - self._fixed)
             # The first part shown is where the stage goes on from: rich tells what remains by the clock from the next.
             total = None if part is None else 1.0
             self._bar.update(self._bar.task_ids[0], state=state, completed=part, total=total)
@@ -79,20 +93,25 @@ class Progress:
             self._stream.write(f"porefv: {text}\n")
             self._stream.flush()
 
-    def _new_bar(self) -> Bar:
+    def _new_bar(self, title: str) -> Bar:
         # rich is loaded for a terminal only. It does not take standard output and error into its hands.
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
         from rich.table import Column
 
-        # Where a terminal is narrow, the state gives way.
+        console = Console(file=self._stream, highlight=False)
+        # Where a terminal is narrow, columns give way, and values of the state one by one: none is cut.
+        others = [
+            (BarColumn(bar_width=8, table_column=Column(min_width=8)), 8),
+            (TimeElapsedColumn(table_column=Column(min_width=7)), 7),
+            (TimeRemainingColumn(compact=True, table_column=Column(min_width=5)), 5),
+        ]
+        shown = [column for column, _ in others] if console.width >= 60 else [others[1][0]]
+        self._fixed = len(title) + sum(1 + width for column, width in others if column in shown) + 1
         columns = (
             TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True)),
-            BarColumn(bar_width=8, table_column=Column(min_width=8)),
-            TimeElapsedColumn(table_column=Column(min_width=7)),
-            TimeRemainingColumn(compact=True, table_column=Column(min_width=5)),
+            *shown,
             TextColumn("{task.fields[state]}", markup=False, table_column=Column(no_wrap=True, ratio=1)),
         )
-        console = Console(file=self._stream, highlight=False)
         return Bar(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
