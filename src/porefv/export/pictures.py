@@ -13,7 +13,6 @@ import numpy as np
 
 from porefv.errors import InputError
 from porefv.export.html_scenes import write_html
-from porefv.export.picture_output import Picture
 from porefv.export.picture_data import (
     KINDS,
     SECTIONS,
@@ -23,6 +22,7 @@ from porefv.export.picture_data import (
     data_of_mesh,
     data_of_packing,
 )
+from porefv.export.picture_output import Picture
 from porefv.export.picture_style import (
     FLOW,
     INK,
@@ -174,7 +174,7 @@ def _plotter(data: PictureData, what: str, size: PictureSize, triangles: int) ->
     plotter = pv.Plotter(off_screen=True, window_size=(size.width, size.height))
     plotter.set_background("white")
     view = View(data.box, 2 if data.axis is None else data.axis)
-    scene = Scene(pv, plotter, data, view, triangles)
+    scene = Scene(pv, plotter, data, view, triangles, line_width=1.5 * size.dpi / SIZE.dpi)
     scene.fill(what)
     gap = 0.06 + scene.margin
     extent = [view.corner(*signs) for signs in product((-1, 1), repeat=3)]

@@ -41,6 +41,8 @@ class Scene:
     view : View
     triangles : int
         About as many as all balls together may have.
+    line_width : float
+        Of thin lines [pixels].
 
     Attributes
     ----------
@@ -52,9 +54,9 @@ class Scene:
         How far what was added may reach beyond the box, in the view.
     """
 
-    def __init__(self, pyvista: Any, plotter: Any, data: PictureData, view: View, triangles: int = TRIANGLES):
+    def __init__(self, pyvista: Any, plotter: Any, data: PictureData, view: View, triangles: int, line_width: float):
         self.pv, self.plotter, self.data, self.view = pyvista, plotter, data, view
-        self.triangles = triangles
+        self.triangles, self.line_width = triangles, line_width
         self.colours: list[Colours] = []
         self.notes: list[str] = []
         self.margin = 0.0
@@ -82,7 +84,7 @@ class Scene:
             self._add_network(self.data.network, what)
         self.plotter.add_mesh(
             self.pv.Box(np.stack([-self.view.half, self.view.half], axis=1).ravel()).extract_all_edges(),
-            color=INK, line_width=1.5, lighting=False,
+            color=INK, line_width=self.line_width, lighting=False,
         )  # fmt: skip
 
     # ---- grains and pores -------------------------------------------------------------------------------------
@@ -214,7 +216,7 @@ class Scene:
 
     def add_length_bar(self, start: np.ndarray, end: np.ndarray) -> None:
         """A bar of a round length beside the box."""
-        self.plotter.add_mesh(self.pv.Line(start, end), color=INK, line_width=5.0, lighting=False)
+        self.plotter.add_mesh(self.pv.Line(start, end), color=INK, line_width=3.5 * self.line_width, lighting=False)
 
 
 def _by_scalars(name: str, scale: Colours) -> dict[str, Any]:

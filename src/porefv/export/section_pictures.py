@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.export.picture_output import Picture
 from porefv.export.picture_data import PictureData
+from porefv.export.picture_output import Picture
 from porefv.export.picture_style import (
     GRAIN_SECTION,
     INK,
@@ -30,9 +30,11 @@ from porefv.export.sections import Discs, Plane, Polygons, cut_cells, cut_sphere
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Longest arrow of a velocity, relative to the mean radius of the grains.
-_ARROW = 0.9
-# The same relative to the shorter side of the section, for boxes of few grains.
+# Length of an arrow that is longer than nine tenths of all, relative to the mean radius of the grains.
+_ARROW = 0.8
+# Room that an arrow needs at its place, from the nearest grain, relative to the same.
+_ROOM = 0.08
+# Longest arrow, relative to the shorter side of the section, for boxes of few grains.
 _ARROW_OF_BOX = 0.1
 
 
@@ -86,7 +88,12 @@ def section_picture(
         if colours is not None:
             colours.draw(axes.inset_axes((1.06, 0.2, 0.035, 0.6)))
         place = f"{'xyz'[plane.normal]} = {plane.at * unit.factor:.4g} {unit.name}"
-        axes.set_title(f"{title},  {place}" if title else place, loc="left", pad=16.0 if what == "velocity" else 8.0, parse_math=False)
+        axes.set_title(
+            f"{title},  {place}" if title else place,
+            loc="left",
+            pad=16.0 if what == "velocity" else 8.0,
+            parse_math=False,
+        )
         if notes:
             figure.supxlabel("; ".join(notes), fontsize=SMALL, color=PALE_INK)
     return Picture(figure, tuple(notes))
@@ -134,20 +141,21 @@ def add_discs(axes: Axes, discs: Discs, unit: Unit, colour: str = GRAIN_SECTION)
 def add_velocities(
     axes: Axes, data: PictureData, plane: Plane, polygons: Polygons, discs: Discs, unit: Unit
 ) -> list[str]:
-    """An arrow for each pore that has fluid in the plane: its mean velocity, projected on the plane."""
+    """An arrow for each pore that has room in the plane: its mean velocity, projected on the plane."""
     assert data.cells is not None and data.velocity is not None
     points, gaps = open_points(polygons, discs)
     pores = data.cells.pore[polygons.cells]
     # Of a pore of several cells, the cell with most room; then those whose point is in the fluid.
     order = np.lexsort((-gaps, pores))
     best = order[np.unique(pores[order], return_index=True)[1]]
-    best = best[gaps[best] > 0.0]
+    best = best[gaps[best] > _ROOM * data.radii.mean()]
     vectors = plane.project(data.velocity[pores[best]])
     lengths = np.linalg.norm(vectors, axis=1)
     if not len(best) or not lengths.max() > 0.0:
         return ["no arrows: nothing flows in this plane"]
     sides = plane.project(data.box.size[None])[0]
-    longest = min(_ARROW * data.radii.mean(), _ARROW_OF_BOX * sides.min()) * unit.factor
+    usual = np.quantile(lengths, 0.9) or lengths.max()
+    longest = min(_ARROW * data.radii.mean() * lengths.max() / usual, _ARROW_OF_BOX * sides.min()) * unit.factor
     x, y = (points[best] * unit.factor).T
     u, v = (vectors * (longest / lengths.max())).T
     arrows = axes.quiver(
@@ -157,4 +165,4 @@ def add_velocities(
     )  # fmt: skip
     arrows.set_in_layout(False)
     most = in_unit(float(lengths.max()), "m/s")
-    return [f"arrows: mean velocity of each pore in the plane, the longest {most}"]
+    return [f"arrows: mean velocity of each pore with room in the plane, the longest {most}"]

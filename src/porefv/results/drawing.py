@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv.export import pictures
-from porefv.export.picture_output import FORMATS_2D, FORMATS_3D, Picture
 from porefv.export.picture_data import SECTIONS, Cells, Network, PictureData, check_kind
+from porefv.export.picture_output import FORMATS_2D, FORMATS_3D, Picture
 from porefv.export.picture_style import SIZE, PictureSize
 from porefv.flow.walls import Walls
 from porefv.mesh.polyhedra import Polyhedra
