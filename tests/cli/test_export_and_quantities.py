@@ -51,6 +51,48 @@ def test_plot_of_a_quantity_that_was_not_asked_for_names_the_remedy(write_scene,
     assert not (tmp_path / "a.png").exists()
 
 
+def test_plot_draws_every_kind_that_it_offers():
+    from porefv.cli.plot import KINDS
+    from porefv.results.drawing import PICTURES
+
+    assert sorted(KINDS) == sorted(PICTURES)
+
+
+def test_plot_draws_a_section_of_results_at_a_place(solved, tmp_path, capsys):
+    path = tmp_path / "a.svg"
+    options = ["--what", "section", "--axis", "x", "--at", "0.3", "--size", "400x300", "--dpi", "50"]
+    assert main(["plot", str(solved), "--out", str(path), *options]) == 0
+    text = path.read_text(encoding="utf-8")
+    assert "x = 0.3 m" in text and "pressure, Pa" in text and 'width="576pt"' in text  # 8 inches
+    assert capsys.readouterr() == ("", "")
+
+
+def test_plot_says_what_a_picture_leaves_out(solved, tmp_path, capsys):
+    options = ["--what", "velocity", "--size", "400x300", "--dpi", "50"]
+    assert main(["plot", str(solved), "--out", str(tmp_path / "a.png"), *options]) == 0
+    assert "porefv plot: arrows: mean velocity" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--what", "forces"], 'has no force: add "forces" to the quantities'),
+    (["--what", "section", "--at", "2"], "must lie within the box, between 0 and 1 m"),
+    (["--what", "profile", "--axis", "x"], "profile has none"),
+    (["--axis", "x"], "the picture pressure has none"),
+])  # fmt: skip
+def test_plot_refuses_what_it_cannot_draw(solved, tmp_path, capsys, options, said):
+    assert main(["plot", str(solved), "--out", str(tmp_path / "a.png"), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_plot_draws_a_packing_file_and_refuses_what_needs_a_flow(tmp_path, capsys):
+    packing = str(PACKINGS / "n25_s1.csv")
+    assert main(["plot", packing, "--what", "section", "--out", str(tmp_path / "a.svg")]) == 0
+    assert "there are no pores" in capsys.readouterr().err
+    assert main(["plot", packing, "--what", "network", "--out", str(tmp_path / "a.png")]) == 2
+    assert "--what can be packing or section" in capsys.readouterr().err
+
+
 def test_export_writes_a_network_that_numpy_reads(solved, tmp_path, capsys):
     path = tmp_path / "network.npz"
     assert main(["export", str(solved), "--to", "openpnm", "--out", str(path)]) == 0

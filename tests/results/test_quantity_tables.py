@@ -14,7 +14,8 @@ from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.packing import Packing
 from porefv.results import Sections
-from porefv.results.quantity_pictures import draw_quantity, quantity_picture
+from porefv.results.drawing import draw
+from porefv.results.quantity_pictures import quantity_picture
 from porefv.scenes.flow_scene import FlowScene
 from porefv.transport.diffusion import effective_diffusion
 
@@ -209,20 +210,20 @@ def test_layers_finer_than_any_grain_read_back(flow, tmp_path):
 def test_pictures_show_the_table(found, tmp_path, quantity):
     pytest.importorskip("matplotlib")
     path = tmp_path / "picture.png"
-    draw_quantity(found, quantity, path)
+    draw(found, path, quantity)
     assert path.read_bytes().startswith(b"\x89PNG")
-    axes = quantity_picture(found, quantity).axes
+    axes = quantity_picture(found, quantity).figure.axes
     assert [ax.get_xlabel() for ax in axes] == {
         "profile": ["porosity", "mean pressure, Pa"],
-        "pore_sizes": ["radius of the inscribed sphere of a pore, m"],
-        "constriction_sizes": ["radius of the inscribed circle of a throat, m"],
+        "pore_sizes": ["radius of the inscribed sphere of a pore, mm"],
+        "constriction_sizes": ["radius of the inscribed circle of a throat, mm"],
     }[quantity]
 
 
 def test_curves_of_distributions_end_at_one(found):
     pytest.importorskip("matplotlib")
     for quantity in ("pore_sizes", "constriction_sizes"):
-        curves = [line for line in quantity_picture(found, quantity).axes[0].lines if len(line.get_xdata()) > 1]
+        curves = [line for line in quantity_picture(found, quantity).figure.axes[0].lines if len(line.get_xdata()) > 1]
         assert [line.get_ydata()[-1] for line in curves] == [1.0, 1.0]
 
 

@@ -10,14 +10,14 @@ from porefv.system.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from porefv.export.meshio_mesh import to_meshio
     from porefv.export.openpnm_network import openpnm_network
-    from porefv.export.pictures import flow_picture, picture
+    from porefv.export.pictures import picture
     from porefv.export.pore_viewer import PoreViewer
     from porefv.export.trajectories import Trajectory
     from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, to_pyvista
 
 __all__ = [
-    "PoreViewer", "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "picture", "spheres_polydata",
-    "throats_polydata", "to_meshio", "to_pyvista",
+    "PoreViewer", "Trajectory", "cells_grid", "openpnm_network", "picture", "spheres_polydata", "throats_polydata",
+    "to_meshio", "to_pyvista",
 ]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
@@ -25,7 +25,6 @@ __getattr__, __dir__ = lazy_exports(
         "PoreViewer": "porefv.export.pore_viewer",
         "Trajectory": "porefv.export.trajectories",
         "cells_grid": "porefv.export.vtk_datasets",
-        "flow_picture": "porefv.export.pictures",
         "openpnm_network": "porefv.export.openpnm_network",
         "picture": "porefv.export.pictures",
         "spheres_polydata": "porefv.export.vtk_datasets",

@@ -1,263 +1,220 @@
-"""A picture of a flow: the sample cut open, grains coloured by the force on them, pores by their pressure.
+"""Pictures of packings, meshes and flows: the kinds that `porefv plot` draws, too.
 
-Typically: `porefv.export.flow_picture(flow).screenshot("flow.png")`.
+Typically: `flow.plot("section", axis="x").save("section.svg")`.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
-from typing import TYPE_CHECKING, Any
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from porefv.errors import ComputationError
-from porefv.export.vtk_datasets import spheres_polydata
-from porefv.flow.walls import Walls
-from porefv.system.optional_imports import load
+from porefv.errors import InputError
+from porefv.export.html_scenes import write_html
+from porefv.export.picture_data import (
+    KINDS,
+    SECTIONS,
+    PictureData,
+    check_kind,
+    data_of_flow,
+    data_of_mesh,
+    data_of_packing,
+)
+from porefv.export.picture_output import Picture
+from porefv.export.picture_style import (
+    FLOW,
+    INK,
+    PALE_INK,
+    SIZE,
+    SMALL,
+    Colours,
+    PictureSize,
+    new_figure,
+    round_length,
+    style,
+    unit_for,
+)
+from porefv.export.rendering import Projection, View, load_pyvista
+from porefv.export.scenes_3d import TRIANGLES, Scene
+from porefv.export.section_pictures import section_picture
+from porefv.flow.pore_flow import PoreFlow
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.packing import Packing
 
 if TYPE_CHECKING:
-    import pyvista
+    from matplotlib.figure import Figure
 
-    from porefv.flow.pore_flow import PoreFlow
+__all__ = ["KINDS", "draw", "picture"]
 
-SIZE = (1600, 1200)  # pixels
-_TRIANGLES = 1_500_000  # about as many as all balls together may have
-_FORCES, _PRESSURES = "YlOrRd", "viridis"  # two families of colours that are not taken for one another
-_GRAIN, _SECTION, _INK, _FLOW = "#d9d4cc", "#ece8e1", "#222222", "#1f5a99"
-
-
-def flow_picture(
-    flow: PoreFlow, *, forces: bool = True, title: str = "", size: tuple[int, int] = SIZE
-) -> pyvista.Plotter:
-    """The `picture` of a flow, whose pressures and, if asked for, forces are computed if they are not yet.
-
-    Parameters
-    ----------
-    flow : PoreFlow
-    forces : bool
-        Colour the grains by the force on them.
-    title, size
-        As for `picture`.
-
-    Returns
-    -------
-    pyvista.Plotter
-        As of `picture`.
-    """
-    pv = load_pyvista()
-    data = {"total_force": flow.forces.total} if forces else {}
-    spheres = pv.PolyData(spheres_polydata(flow.mesh.packing, **data))
-    return picture(spheres, flow.mesh.to_pyvista(pressure=flow.pressure), walls=flow.walls, title=title, size=size)
+# Part of a picture in three dimensions that the sample fills, as fractions: left, right, bottom, top.
+_FREE = (0.03, 0.78, 0.07, 0.91)
 
 
 def picture(
-    spheres: pyvista.PolyData,
-    pores: pyvista.UnstructuredGrid,
+    sample: PoreFlow | PoreMesh | Packing,
+    what: str | None = None,
     *,
-    walls: Walls | None = None,
-    upright: int = 1,
+    axis: str | None = None,
+    at: float | None = None,
     title: str = "",
-    size: tuple[int, int] = SIZE,
-) -> pyvista.Plotter:
-    """The sample, flow axis upright; if the pores have pressures, its front quarter is cut out to show them.
+    size: PictureSize | tuple[int, int] = SIZE,
+    dpi: float | None = None,
+) -> Picture:
+    """A picture of a flow, a mesh or a packing; what it shows is computed, if it is not yet.
 
     Parameters
     ----------
-    spheres : pyvista.PolyData
-        Centres with the point data `radius` and, to be coloured by its size, `total_force` [N].
-    pores : pyvista.UnstructuredGrid
-        The mesh, with or without the cell data `pressure` [Pa].
-    walls : Walls, optional
-        Say which way the flow goes, for an arrow.
-    upright : int
-        Axis that is upright where there is no axis of flow.
+    sample : PoreFlow, PoreMesh or Packing
+    what : str, optional
+        One of `KINDS`. In three dimensions: "packing" (grains), "forces" (grains coloured by the force on them, cut
+        open to show the pressures), "pressure" (the same with grey grains), "network" (throats as wide as their flux,
+        coloured by pressure), "throats" (as wide as their constrictions, coloured by the mean speed there). In a
+        plane: "section" (grains as discs, pores coloured by pressure), "velocity" (pores coloured by speed, with
+        arrows). By default "forces" of a flow, "section" of a mesh, "packing" of a packing.
+    axis, at
+        Of a section: the axis to which its plane is normal, "x", "y" or "z", and its place along it [m].
     title : str
     size : (int, int)
-        Width and height of the picture, in pixels.
+        Width and height [pixels].
+    dpi : float, optional
+        Pixels per inch: how large letters and lines are.
 
     Returns
     -------
-    pyvista.Plotter
-        Off-screen; its `screenshot(path)` writes a file.
+    Picture
 
     Raises
     ------
+    InputError
+        For an unknown kind, what the sample does not have, or a plane outside the box.
     MissingExtraError
-        If pyvista is not installed.
+        If matplotlib is not installed, or pyvista for pictures in three dimensions.
     ComputationError
-        If this machine cannot draw.
+        If this machine cannot draw in three dimensions.
+
+    Examples
+    --------
+    >>> mesh = PoreMesh(Packing.read("data/packings/n25_s1.csv"))
+    >>> mesh.plot("section", axis="z", at=0.4, size=(800, 600), dpi=100)
+    Picture(800 x 600 pixels)
     """
+    if isinstance(sample, PoreFlow):
+        data = data_of_flow(sample, what := what or "forces")
+    elif isinstance(sample, PoreMesh):
+        data = data_of_mesh(sample, what := what or "section")
+    elif isinstance(sample, Packing):
+        data = data_of_packing(sample, what := what or "packing")
+    else:
+        raise InputError(f"there are pictures of a PoreFlow, a PoreMesh and a Packing, not of {sample!r}")
+    return draw(data, what, axis=axis, at=at, title=title, size=size, dpi=dpi)
+
+
+def draw(
+    data: PictureData,
+    what: str,
+    *,
+    axis: str | None = None,
+    at: float | None = None,
+    title: str = "",
+    size: PictureSize | tuple[int, int] = SIZE,
+    dpi: float | None = None,
+) -> Picture:
+    """A picture of data; parameters and errors as of `picture`."""
+    check_kind(what)
+    size = PictureSize(*size[:2], SIZE.dpi if dpi is None else dpi).check()
+    if what in SECTIONS:
+        return section_picture(data, what, axis=axis, at=at, title=title, size=size)
+    if axis is not None or at is not None:
+        raise InputError(f"axis and at are those of a plane ({' and '.join(SECTIONS)}); the picture {what} has none")
+    return _picture_3d(data, what, title, size)
+
+
+def _picture_3d(data: PictureData, what: str, title: str, size: PictureSize) -> Picture:
+    """The sample, flow axis upright, rendered, with its scales drawn around it."""
+    load_pyvista()
+    plotter, scene, marks = _plotter(data, what, size, TRIANGLES)
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    notes = tuple(scene.notes)
+
+    def html(path: Path) -> None:
+        # What a browser turns is lighter.
+        plotter, scene, _ = _plotter(data, what, size, TRIANGLES // 5)
+        with style():
+            legend = new_figure(size)
+            legend.patch.set_alpha(0.0)
+            _explain(legend, title, scene.colours, (*scene.notes, marks["bar"].text))
+        write_html(plotter, legend, path)
+
+    with style():
+        figure = new_figure(size)
+        figure.figimage(image, origin="upper", zorder=-1)
+        _explain(figure, title, scene.colours, notes)
+        for mark in marks.values():
+            x, y = mark.place
+            figure.text(x, y, mark.text, color=mark.colour, ha=mark.across, va=mark.upwards)
+    return Picture(figure, notes, html)
+
+
+class _Mark(NamedTuple):
+    """A text beside the sample: its place in the view or, as fractions, in the picture; its colour and alignment."""
+
+    place: Any
+    text: str
+    colour: str
+    across: str
+    upwards: str
+
+
+def _plotter(data: PictureData, what: str, size: PictureSize, triangles: int) -> tuple[Any, Scene, dict[str, _Mark]]:
+    """A plotter with the sample in it, and the texts beside it."""
     pv = load_pyvista()
-    plotter = pv.Plotter(off_screen=True, window_size=size)
+    plotter = pv.Plotter(off_screen=True, window_size=(size.width, size.height))
     plotter.set_background("white")
-    axis = upright if walls is None or walls.axis is None else walls.axis
-    view = _View(np.asarray(pores.bounds, float).reshape(3, 2), axis)
-    _add_spheres(pv, plotter, spheres, view, opened="pressure" in pores.cell_data)
-    if "pressure" in pores.cell_data:
-        _add_pressures(pv, plotter, spheres, pores, view)
-    plotter.add_mesh(pv.Box(view.bounds.ravel()).extract_all_edges(), color=_INK, line_width=1.5)
-    if walls is not None and walls.axis is not None:
-        _add_arrow(pv, plotter, walls, view)
-    if title:
-        plotter.add_text(title, position=(0.03, 0.935), viewport=True, font_size=_font(size, 17), color=_INK)
-    _aim(plotter, view)
+    view = View(data.box, 2 if data.axis is None else data.axis)
+    scene = Scene(pv, plotter, data, view, triangles, line_width=1.5 * size.dpi / SIZE.dpi)
+    scene.fill(what)
+    gap = 0.06 + scene.margin
+    extent = [view.corner(*signs) for signs in product((-1, 1), repeat=3)]
+    # A bar of a round length, below the lower edge at the right.
+    side = float(2.0 * view.half[view.left])
+    length = round_length(0.5 * side * view.scale)
+    start = view.corner(1, 1, -1) + gap * view.normal(view.right) - gap * view.normal(view.axis)
+    end = start - view.normal(view.left) * length / view.scale
+    scene.add_length_bar(start, end)
+    unit = unit_for(length, "m")
+    below = 0.5 * (start + end) + 0.03 * view.across - 0.015 * view.up
+    marks = {"bar": _Mark(below, f"{length * unit.factor:.6g} {unit.name}", INK, "left", "top")}
+    extent += [start, end, below - 0.05 * view.up]
+    if (sense := _sense(data)) != 0.0:
+        arrow = 0.3 * min(2.0 * view.half[view.axis], 1.0)
+        tail = view.corner(1, -1, 0) + gap * view.normal(view.left) - gap * view.normal(view.right)
+        tail = tail - 0.5 * sense * arrow * view.normal(view.axis)
+        scene.add_arrow(tail, sense * arrow * view.normal(view.axis))
+        below = tail - 0.03 * sense * view.normal(view.axis)
+        marks["flow"] = _Mark(below, "flow", FLOW, "center", "top" if sense > 0.0 else "bottom")
+        extent += [tail - 0.06 * view.across, tail - 0.06 * view.up * sense]
+    projection = Projection(view, np.array(extent), size, _FREE, margin=scene.margin)
+    projection.aim(plotter)
     plotter.enable_anti_aliasing("msaa", multi_samples=8)
-    return plotter
+    return plotter, scene, {name: mark._replace(place=projection.fraction(mark.place)) for name, mark in marks.items()}
 
 
-class _View:
-    """The box, which axis stands upright, and the two others: the viewer stands where both are greatest."""
-
-    def __init__(self, bounds: np.ndarray, axis: int):
-        self.bounds = bounds
-        self.axis = axis
-        self.left, self.right = (axis + 1) % 3, (axis + 2) % 3
-        self.middle = bounds.mean(axis=1)
-        self.size = np.ptp(bounds, axis=1)
-
-    def normal(self, axis: int) -> np.ndarray:
-        return np.eye(3)[axis]
+def _sense(data: PictureData) -> float:
+    """1 where fluid flows up the upright axis, -1 where it flows down; 0 if the walls drive no flow along it."""
+    if data.walls is None or data.axis is None:
+        return 0.0
+    lower, upper = data.walls.pressures[2 * data.axis : 2 * data.axis + 2]
+    return float(np.sign(lower - upper))
 
 
-def _add_spheres(pv: Any, plotter: Any, spheres: Any, view: _View, opened: bool) -> None:
-    points, radii = spheres.points, spheres["radius"]
-    colours: dict[str, Any] = {"color": _GRAIN}
-    values = np.zeros(len(radii))
-    if "total_force" in spheres.point_data:
-        values = np.linalg.norm(spheres["total_force"], axis=1)
-        colours = {
-            "scalars": "force", "cmap": _FORCES, "clim": [0.0, values.max() or 1.0],
-            "scalar_bar_args": _bar("force on a grain [N]", 0, plotter),
-        }  # fmt: skip
-    # The cut leaves whole balls, and parts of those that reach across its two planes.
-    reach = points[:, [view.left, view.right]] - view.middle[[view.left, view.right]]
-    cut = opened & (reach + radii[:, None] > 0.0).all(axis=1)
-    gone = opened & (reach - radii[:, None] >= 0.0).all(axis=1)
-    # The finer the fewer; a grain of 9 spheres deserves a smooth outline, one of 10^5 is a few pixels wide.
-    resolution = int(np.clip(np.sqrt(_TRIANGLES / len(radii) / 2), 8, 60))
-    ball = pv.Sphere(radius=1.0, theta_resolution=resolution, phi_resolution=resolution)
-
-    def balls(chosen: np.ndarray) -> Any:
-        centres = pv.PolyData(points[chosen])
-        centres["radius"], centres["force"] = radii[chosen], values[chosen]
-        return centres.glyph(scale="radius", geom=ball, orient=False)
-
-    surface = balls(~cut)
-    if np.any(cut & ~gone):
-        crossing = balls(cut & ~gone)
-        left, right = view.normal(view.left), view.normal(view.right)
-        behind, before = crossing.clip(left, origin=view.middle, return_clipped=True)
-        surface = surface.append_polydata(behind, before.clip(right, origin=view.middle))
-    if surface.n_points:
-        plotter.add_mesh(surface, smooth_shading=True, ambient=0.15, specular=0.25, specular_power=20, **colours)
-
-
-def _add_pressures(pv: Any, plotter: Any, spheres: Any, pores: Any, view: _View) -> None:
-    """The two faces of the cut: the pores' pressures, and the grains' sections laid upon them."""
-    bar = _bar("pressure [Pa]", 1, plotter)
-    values = pores["pressure"]
-    clim = [float(values.min()), float(values.max()) if np.ptp(values) > 0.0 else float(values.min()) + 1.0]
-    for axis, other in ((view.left, view.right), (view.right, view.left)):
-        normal, beyond = view.normal(axis), view.normal(other)
-        section = pores.slice(normal=normal, origin=view.middle).clip(-beyond, origin=view.middle)
-        plotter.add_mesh(section, scalars="pressure", cmap=_PRESSURES, clim=clim, lighting=False, scalar_bar_args=bar)
-        points, radii = spheres.points, spheres["radius"]
-        heights = view.middle[axis] - points[:, axis]
-        crossed = np.flatnonzero(np.abs(heights) < radii)
-        if len(crossed) == 0:
-            continue
-        centres = pv.PolyData(points[crossed])
-        centres.points[:, axis] = view.middle[axis] + 1e-3 * view.size[axis]  # just before the pores
-        centres["radius"] = np.sqrt(radii[crossed] ** 2 - heights[crossed] ** 2)
-        disc = pv.Disc(inner=0.0, outer=1.0, normal=normal, c_res=60)
-        discs = centres.glyph(scale="radius", geom=disc, orient=False).clip(-beyond, origin=view.middle)
-        plotter.add_mesh(discs, color=_SECTION, lighting=False)
-
-
-def _add_arrow(pv: Any, plotter: Any, walls: Walls, view: _View) -> None:
-    """An arrow down the pressure, beside the sample."""
-    axis = view.axis
-    lower, upper = walls.pressures[2 * axis : 2 * axis + 2]
-    if lower == upper:
-        return
-    sense = 1.0 if lower > upper else -1.0
-    length = 0.3 * min(view.size[axis], max(view.size[view.left], view.size[view.right]))
-    start = view.middle.copy()
-    start[view.left] = view.bounds[view.left, 1] + 0.06 * view.size[view.left]
-    start[view.right] = view.bounds[view.right, 0] - 0.06 * view.size[view.right]
-    start[axis] -= 0.5 * sense * length
-    arrow = pv.Arrow(
-        start=start, direction=sense * view.normal(axis), scale=length,
-        shaft_radius=0.03, tip_radius=0.09, tip_length=0.3, tip_resolution=40, shaft_resolution=40,
-    )  # fmt: skip
-    plotter.add_mesh(arrow, color=_FLOW, ambient=0.3)
-    tail = start - 0.05 * sense * length * view.normal(axis)
-    plotter.add_point_labels(
-        tail[None], ["flow"], shape=None, show_points=False, always_visible=True, bold=False,
-        text_color=_FLOW, font_size=_font(plotter.window_size, 30), justification_horizontal="center",
-        justification_vertical="top" if sense > 0.0 else "bottom",
-    )  # fmt: skip
-
-
-def _aim(plotter: Any, view: _View) -> None:
-    direction = view.normal(view.left) + 0.9 * view.normal(view.right) + 0.5 * view.normal(view.axis)
-    plotter.camera.focal_point = view.middle
-    plotter.camera.position = view.middle + direction
-    plotter.camera.up = view.normal(view.axis)
-    plotter.camera.view_angle = 20.0
-    plotter.reset_camera(bounds=view.bounds.ravel())
-    plotter.camera.SetWindowCenter(0.17, 0.0)  # room for the scales on the right, the title above
-    plotter.camera.zoom(0.97)
-
-
-def _bar(title: str, place: int, plotter: Any) -> dict[str, Any]:
-    """An upright scale of colours on the right, one above the other."""
-    size = plotter.window_size
-    return {
-        "title": f"{title}\n", "vertical": True, "width": 0.045, "height": 0.34,
-        "position_x": 0.84, "position_y": (0.55, 0.1)[place], "color": _INK, "n_labels": 5, "fmt": "%.3g",
-        "title_font_size": _font(size, 26), "label_font_size": _font(size, 24),
-    }  # fmt: skip
-
-
-def _font(size: tuple[int, int], points: int) -> int:
-    return max(6, round(points * size[1] / SIZE[1]))
-
-
-def load_pyvista() -> Any:
-    """The module pyvista, on a machine that can draw."""
-    # Without a display VTK would first try, and complain.
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    pyvista = load("pyvista", "Drawing a picture")
-    ensure_drawing()
-    return pyvista
-
-
-def ensure_drawing() -> None:
-    """VTK's last resort is OSMesa, and a crash without it."""
-    from vtkmodules.vtkCommonCore import vtkObject
-    from vtkmodules.vtkRenderingCore import vtkRenderWindow
-
-    warns = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.SetGlobalWarningDisplay(0)
-    window = vtkRenderWindow().GetClassName()
-    vtkObject.SetGlobalWarningDisplay(warns)
-    if window == "vtkOSOpenGLRenderWindow" and not any(
-        map(library_loads, ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"))
-    ):
-        raise ComputationError(
-            "cannot draw: there is no display, and neither EGL nor OSMesa is installed to draw without one. "
-            "Install Mesa (Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri)"
-        )
-
-
-def library_loads(library: str) -> bool:
-    """Whether the system finds a shared library."""
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
+def _explain(figure: Figure, title: str, colours: list[Colours], notes: tuple[str, ...]) -> None:
+    """Title, scales of colours one above the other, and notes."""
+    if title:
+        figure.text(0.03, 0.965, title, va="top", fontsize=10.0, parse_math=False)
+    for scale, bottom in zip(colours, (0.53, 0.09), strict=False):
+        scale.draw(figure.add_axes((0.82, bottom, 0.022, 0.33)))
+    if notes:
+        figure.text(0.03, 0.02, "; ".join(notes), fontsize=SMALL, color=PALE_INK)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from porefv.conductance.model import FORCE_SPLITS, ForceSplit
-from porefv.errors import InputError
+from porefv.errors import InputError, counted
 from porefv.flow.pressure import PressureField, as_field
 from porefv.flow.pressure_along_throats import ThroatDrops, apply_pressure_along_throats
 from porefv.flow.walls import Walls, ensure_no_imposed_flow
@@ -18,6 +18,7 @@ from porefv.mesh.throats import ThroatFacets
 from porefv.mesh.vectors import dot, vector_at
 from porefv.packing.box import WALL_AXES, WALL_NORMALS, WALL_SENSES
 from porefv.packing.overlaps import sphere_volumes
+from porefv.system.html_table import html_table
 from porefv.system.kernels import helper, kernel
 from porefv.system.number_checks import three_numbers
 from porefv.system.threads import for_rows
@@ -83,6 +84,13 @@ class Forces:
         parts = (self.pressure, self.viscous, self.wall_pressure, self.wall_viscous)
         residual = np.abs(sum(part.sum(axis=0) for part in parts) - self.thrust).max()
         return float(residual / self.scale) if residual != 0.0 else 0.0
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (part.replace("_", ", "), ", ".join(f"{x:.4g}" for x in total) + " N") for part, total in self.sums.items()
+        ]
+        rows.append(("residual", f"{self.conservation_residual:.1e}"))
+        return html_table(f"Forces on {counted(len(self.pressure), 'sphere')} and six walls, sums", rows)
 
     def __repr__(self) -> str:
         total = ", ".join(f"{x:.4g}" for x in self.total.sum(axis=0))

@@ -10,7 +10,7 @@ import math
 import warnings
 from collections.abc import Collection, Sequence
 from types import NoneType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,11 +45,13 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
 from porefv.solvers.solver import TOLERANCE, SolverReport
+from porefv.system.html_table import html_table
 from porefv.system.lazy import FixedInputs, lazy_property
 from porefv.system.number_checks import MOST, ensure_finite, three_numbers
 from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
+    from porefv.export.picture_output import Picture
     from porefv.fipy.flow_problem import FlowProblem
 
 STANDARD_GRAVITY = 9.80665  # m/s², for the hydraulic conductivity k ρ g / μ
@@ -519,6 +521,18 @@ class PoreFlow(FixedInputs):
             ensure_finite(forces.total, "forces")
             return forces
 
+    def plot(self, what: str = "forces", **options: Any) -> Picture:
+        """A picture of the flow (see `porefv.export.picture`): "forces", "pressure", "network", "section" and others.
+
+        Examples
+        --------
+        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+        >>> flow.plot("section", axis="z").save("section.svg")
+        """
+        from porefv.export.pictures import picture
+
+        return picture(self, what, **options)
+
     def to_fipy(self, without: Collection[str] = ()) -> FlowProblem:
         """The flow in FiPy: its mesh, velocity, and pressure equation (see `porefv.fipy`).
 
@@ -538,6 +552,24 @@ class PoreFlow(FixedInputs):
         return flow_to_openpnm(self)
 
     # ---- bookkeeping --------------------------------------------------------------------------------------------
+
+    def _repr_html_(self) -> str:
+        """What was given, and what has been computed: showing a flow computes nothing."""
+        rows = [
+            ("packing", repr(self.mesh.packing)),
+            ("fluid", f"viscosity {self.fluid.viscosity:g} Pa s, density {self.fluid.density:g} kg/m³"),
+            *((name, condition_text(vars(wall))) for name, wall in zip(WALLS, self.walls, strict=True)),
+            *((name, str(len(given))) for name, given in
+              (("sources", self.sources), ("fixed pressures", self.fixed_pressures)) if given),
+            ("conductance", self.conductance.name),
+        ]  # fmt: skip
+        if "solution" in vars(self):
+            rows += [("inflow", f"{self.inflow:.6g} m³/s"), ("outflow", f"{self.outflow:.6g} m³/s")]
+        if "permeability" in vars(self):
+            rows.append(("permeability", f"{self.permeability:.6g} m²"))
+        if "forces" in vars(self):
+            rows.append(("force on all spheres", ", ".join(f"{x:.4g}" for x in self.forces.total.sum(axis=0)) + " N"))
+        return html_table("Flow", rows)
 
     def __repr__(self) -> str:
         passed = [f"{name} {condition_text(vars(wall))}" for name, wall in zip(WALLS, self.walls, strict=True)

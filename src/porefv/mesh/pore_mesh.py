@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from porefv.mesh.throats import Throats
 from porefv.mesh.uniting import unite
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.system.html_table import html_table
 from porefv.system.lazy import lazy_property
 
 if TYPE_CHECKING:
+    from porefv.export.picture_output import Picture
     from porefv.fipy.fluid_mesh import FluidMesh
 
 # Laguerre vertices this close, relative to the smallest sphere of the facet between them, coincide but for rounding.
@@ -147,6 +149,12 @@ class PoreMesh(CellMesh):
         """The throats between the pores."""
         return Throats(self)
 
+    def plot(self, what: str = "section", **options: Any) -> Picture:
+        """A picture of the mesh (see `porefv.export.picture`): "section", "network", "throats" or "packing"."""
+        from porefv.export.pictures import picture
+
+        return picture(self, what, **options)
+
     def to_fipy(self, without: Collection[str] = ()) -> FluidMesh:
         """The fluid in the pores as a FiPy mesh (see `porefv.fipy`).
 
@@ -164,6 +172,16 @@ class PoreMesh(CellMesh):
         from porefv.export.openpnm_network import mesh_to_openpnm
 
         return mesh_to_openpnm(self)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("spheres", str(self.n_spheres)),
+            ("pores", f"{self.n_pores}, of {self.n_cells} cells"),
+            ("throats", f"{len(self.throats)}, {np.count_nonzero(self.throats.closed)} of them closed"),
+            ("void volume", f"{self.pore_volumes.sum():.4g} m³"),
+            ("box", self.box.sides),
+        ]
+        return html_table("Pore mesh", rows)
 
     def __repr__(self) -> str:
         return (

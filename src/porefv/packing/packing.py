@@ -15,6 +15,7 @@ from porefv.errors import InputError, PackingFileWarning, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
 from porefv.packing.reading import Reading
+from porefv.system.html_table import html_table, range_text
 from porefv.system.number_checks import is_finite_number
 
 _MOST_SHOWN = 5  # culprits listed in one error
@@ -357,6 +358,17 @@ class Packing:
         radii = f"radius {smallest:.3g}" if smallest == largest else f"radii {smallest:.3g}...{largest:.3g}"
         box = "no box" if self.box is None else f"box {self.box.sides}"
         return f"Packing({counted(len(self), 'sphere')}, {radii} m, {box})"
+
+    def _repr_html_(self) -> str:
+        rows = [("spheres", str(len(self))), ("radii", range_text(self.radii, "m"))]
+        if self.box is None:
+            rows.append(("box", "none"))
+        else:
+            box = self.box
+            rows += [("box", f"{vector(box.lower)} to {vector(box.upper)} m"), ("sides", box.sides)]
+        if self.source is not None:
+            rows.append(("file", str(self.source.path)))
+        return html_table("Packing", rows)
 
     def _wall_distances(self) -> Floats:
         """(n, 6) distance of each centre from each wall, m, positive inside; (n, 0) without a box."""

@@ -1,47 +1,150 @@
-"""The picture of a results directory, as a PNG file."""
+"""Pictures of a results directory, and of the quantities in it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.export.pictures import SIZE, load_pyvista, picture
-from porefv.export.vtk_datasets import spheres_polydata
+from porefv.export import pictures
+from porefv.export.picture_data import SECTIONS, Cells, Network, PictureData, check_kind
+from porefv.export.picture_output import FORMATS_2D, FORMATS_3D, Picture
+from porefv.export.picture_style import SIZE, PictureSize
 from porefv.flow.walls import Walls
-from porefv.packing.box import WALLS
-from porefv.packing.packing import Packing
+from porefv.mesh.polyhedra import Polyhedra
+from porefv.packing.box import WALLS, Box
+from porefv.results.quantity_pictures import QUANTITY_PICTURES, quantity_picture
 from porefv.results.reading import Results
-from porefv.system.atomic_files import atomic_write, locked, picture_target
+from porefv.system.atomic_files import picture_target
+
+if TYPE_CHECKING:
+    import pyvista
+
+# What `porefv plot --what` draws of results.
+PICTURES = (*pictures.KINDS, *QUANTITY_PICTURES)
 
 
-def draw(results: Results, path: str | PathLike[str], size: tuple[int, int] = SIZE) -> None:
-    """Write a PNG picture of a results directory.
+def draw(results: Results, path: str | PathLike[str], what: str | None = None, **options: Any) -> Picture:
+    """Write a picture of a results directory: PNG; SVG or PDF of a diagram; HTML in three dimensions.
+
+    Parameters
+    ----------
+    results : Results
+    path : path
+    what, **options
+        As of `results_picture`.
+
+    Returns
+    -------
+    Picture
+        What was written.
 
     Raises
     ------
     InputError
-        If the results have no VTK files, or the picture cannot be written.
+        If the results do not have what is to be drawn, or the picture cannot be written.
     ComputationError
         If this machine cannot draw.
     """
-    path = picture_target(path)
+    what = what or default_kind(results)
+    picture_target(path, formats_of(what))  # before it is drawn
+    found = results_picture(results, what, **options)
+    found.save(path)
+    return found
+
+
+def formats_of(what: str) -> tuple[str, ...]:
+    """Endings of the files that a picture, one of `PICTURES`, can be saved as."""
+    return FORMATS_2D if what in SECTIONS or what in QUANTITY_PICTURES else FORMATS_3D
+
+
+def default_kind(results: Results) -> str:
+    """The picture that shows most of the results."""
+    if "total_force" in results.spheres.point_data:
+        return "forces"
+    return "pressure" if "pressure" in results.pores.cell_data else "packing"
+
+
+def results_picture(
+    results: Results,
+    what: str | None = None,
+    *,
+    axis: str | None = None,
+    at: float | None = None,
+    size: PictureSize | tuple[int, int] = SIZE,
+    dpi: float | None = None,
+) -> Picture:
+    """A picture of a results directory.
+
+    Parameters
+    ----------
+    results : Results
+    what : str, optional
+        One of `PICTURES`: of `porefv.export.picture`, or a quantity. By default what shows most of the results.
+    axis, at, size, dpi
+        As of `porefv.export.picture`.
+    """
+    what = what or default_kind(results)
+    if what in QUANTITY_PICTURES:
+        return quantity_picture(results, what, size=size, dpi=dpi)
+    data = _data(results, what)
     summary = results.summary
     title = f"{Path(summary['scene']).stem}: " if summary["scene"] else ""
     title += f"{summary['packing']['spheres']} spheres"
     if "permeability" in summary:
         title += f",  k = {summary['permeability']:.4g} m²"
-    with locked(path), atomic_write(path) as temporary:
-        picture(
-            results.spheres,
-            results.pores,
-            walls=_walls_at_pressures(summary),
-            title=title,
-            size=size,
-        ).screenshot(temporary)
+    return pictures.draw(data, what, axis=axis, at=at, title=title, size=size, dpi=dpi)
+
+
+def _data(results: Results, what: str) -> PictureData:
+    """What a kind of picture shows of the results; InputError with the remedy if they do not have it."""
+    check_kind(what)
+    spheres, pores = results.spheres, results.pores
+    parts = {
+        "cells": lambda: _cells(pores),
+        "network": lambda: _network(results.throats),
+        "pressure": lambda: _by_pore(pores, "pressure"),
+        "velocity": lambda: _by_pore(pores, "velocity"),
+        "force": lambda: spheres.point_data.get("total_force"),
+        "flux": lambda: results.throats.cell_data.get("flux"),
+    }
+    data = PictureData(
+        np.asarray(spheres.points, float), np.asarray(spheres["radius"]), Box.between(pores.bounds),
+        walls=_walls_at_pressures(results.summary), missing=lambda name: _remedy(results, name),
+    )  # fmt: skip
+    return data.with_parts(what, parts)
+
+
+def _cells(pores: pyvista.UnstructuredGrid) -> Cells:
+    solids = Polyhedra(np.asarray(pores.points, float), pores.celltypes, pores.cell_offsets, pores.cell_connectivity)
+    return Cells(solids, np.asarray(pores["pore"]))
+
+
+def _network(throats: pyvista.PolyData) -> Network:
+    pores = np.asarray(throats.lines).reshape(-1, 3)[:, 1:]
+    areas = np.asarray(throats["fluid_area"], float)
+    if "conductance" in throats.cell_data:
+        areas = np.where(throats["conductance"] > 0.0, areas, 0.0)
+    return Network(np.asarray(throats.points, float), pores, areas)
+
+
+def _by_pore(pores: pyvista.UnstructuredGrid, name: str) -> np.ndarray | None:
+    """Cell data by pore; None if the mesh does not have them."""
+    if name not in pores.cell_data:
+        return None
+    _, first = np.unique(pores["pore"], return_index=True)
+    return np.asarray(pores[name], float)[first]
+
+
+def _remedy(results: Results, name: str) -> str:
+    quantity = {"force": "forces", "velocity": "pressure"}.get(name, name)
+    return (
+        f'{results.directory} has no {name}: add "{quantity}" to the quantities in the scene\'s [output], and solve '
+        "again."
+    )
 
 
 def _walls_at_pressures(summary: Mapping[str, Any]) -> Walls:
@@ -51,22 +154,3 @@ def _walls_at_pressures(summary: Mapping[str, Any]) -> Walls:
         return walls
     found = summary["flow"]["wall_pressure"]
     return walls.with_pressures(np.array([found.get(name, np.nan) for name in WALLS]))
-
-
-def draw_packing(packing: Packing, name: str, path: str | PathLike[str], size: tuple[int, int] = SIZE) -> None:
-    """Write a PNG picture of the spheres of a packing in its box, or in their bounding box.
-
-    Raises
-    ------
-    InputError
-        If the picture cannot be written.
-    ComputationError
-        If this machine cannot draw.
-    """
-    path = picture_target(path)
-    pyvista = load_pyvista()
-    box = packing.bounding_box if packing.box is None else packing.box
-    outline = pyvista.Box(box.wall_places).cast_to_unstructured_grid()
-    spheres = pyvista.PolyData(spheres_polydata(packing))
-    with locked(path), atomic_write(path) as temporary:
-        picture(spheres, outline, upright=2, title=f"{name}: {len(packing)} spheres", size=size).screenshot(temporary)

@@ -15,6 +15,7 @@ from porefv.errors import InputError
 from porefv.results.force_table import FORCE_FILES, read_forces
 from porefv.results.quantity_tables import TABLES, read_quantity
 from porefv.system.atomic_files import put_back
+from porefv.system.html_table import html_table
 from porefv.system.optional_imports import load
 
 if TYPE_CHECKING:
@@ -104,6 +105,17 @@ class Results:
     def throats(self) -> pyvista.PolyData:
         """The network of throats.vtp."""
         return self._read_vtk("throats.vtp")
+
+    def _repr_html_(self) -> str:
+        summary = self.summary
+        rows = [("directory", str(self.directory))]
+        if summary.get("scene"):
+            rows.append(("scene", str(summary["scene"])))
+        rows += [("spheres", str(summary["packing"]["spheres"])), ("porosity", f"{summary['packing']['porosity']:.4g}")]
+        if "permeability" in summary:
+            rows.append(("permeability", f"{summary['permeability']:.6g} m²"))
+        rows.append(("files", ", ".join(sorted(path.name for path in self.directory.iterdir()))))
+        return html_table("Results", rows)
 
     def _read_quantity(self, quantity: str) -> np.ndarray:
         path = self._file(TABLES[quantity].file, f'add "{quantity}" to the quantities')

@@ -8,24 +8,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import InputError, MissingExtraError, counted
+from porefv.errors import InputError, counted
+from porefv.export.picture_output import FORMATS_2D, Picture
+from porefv.export.picture_style import AXIS_COLOURS, PALE_INK, SIZE, SMALL, PictureSize, new_figure, style
 from porefv.packing.box import WALLS
 from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
 from porefv.simulation.series import PROFILES
-from porefv.system.atomic_files import atomic_write, locked, picture_target
+from porefv.system.atomic_files import picture_target
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Moments of which profiles are drawn.
 _MOMENTS = 6
-# A colour for each axis, a line style for each of its two walls.
-_COLOURS = {"x": "tab:green", "y": "tab:orange", "z": "tab:blue"}
 
 
-def draw_series(directory: str | PathLike[str], path: str | PathLike[str]) -> None:
-    """Write a PNG picture of the series of a results directory, also while its run goes on.
+def draw_series(directory: str | PathLike[str], path: str | PathLike[str], **options: Any) -> Picture:
+    """Write a picture of the series of a results directory, also while its run goes on: PNG, SVG or PDF.
+
+    Parameters
+    ----------
+    directory, path : path
+    **options
+        `size` and `dpi`, as of `series_picture`.
 
     Raises
     ------
@@ -34,44 +41,53 @@ def draw_series(directory: str | PathLike[str], path: str | PathLike[str]) -> No
     MissingExtraError
         If matplotlib is not installed.
     """
-    path = picture_target(path)
-    picture = series_picture(directory)
-    with locked(path), atomic_write(path) as temporary:
-        picture.savefig(temporary, dpi=150)
+    picture_target(path, FORMATS_2D)
+    picture = Picture(series_picture(directory, **options))
+    picture.save(path)
+    return picture
 
 
-def series_picture(directory: str | PathLike[str]) -> Any:
-    """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`."""
-    try:
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError:
-        raise MissingExtraError("matplotlib", "Drawing time series") from None
+def series_picture(
+    directory: str | PathLike[str], *, size: tuple[int, int] | None = None, dpi: float | None = None
+) -> Figure:
+    """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`.
+
+    Parameters
+    ----------
+    directory : path
+    size : (int, int), optional
+        Width and height; by default as high as there are curves [pixels].
+    dpi : float, optional
+        Pixels per inch.
+    """
     record, series = read_record(directory), read_series(directory)
     if len(series) == 0:
         raise InputError(f"{directory} has no rows to draw yet")
     wet = "mean_pressure" in (series.dtype.names or ())
     profiles = read_profiles(directory) if (Path(directory) / PROFILES).is_file() else None
     rows = 2 if wet or profiles is not None else 1
-    figure = Figure(figsize=(12.0, 4.2 * rows), layout="constrained")
-    axes = iter(np.atleast_1d(figure.subplots(rows, 2)).ravel())
-    if wet:
-        _pressures(next(axes), series)
-    _stresses(next(axes), series, wet)
-    _strains(next(axes), series)
-    in_time = list(figure.axes[: 3 if wet else 2])
-    for ax in in_time:
-        _stages(ax, record)
-        ax.set_xlim(series["time"][0], max(series["time"][-1], np.nextafter(series["time"][0], np.inf)))
-        ax.set_xlabel("time, s")
-        ax.grid(alpha=0.3)
-        ax.legend(fontsize=8)
-    if profiles is not None and len(profiles):
-        _profiles(next(axes), profiles, record, "pressure" if wet else "effective_stress")
-    for ax in axes:
-        ax.set_axis_off()
-    title = Path(record.path).stem if record.path else str(directory)
-    text = f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}"
-    figure.suptitle(text, parse_math=False)
+    size = size or (2000, 700 * rows)
+    with style():
+        figure = new_figure(PictureSize(*size, SIZE.dpi if dpi is None else dpi).check(), layout="constrained")
+        axes = iter(np.atleast_1d(figure.subplots(rows, 2)).ravel())
+        if wet:
+            _pressures(next(axes), series)
+        _stresses(next(axes), series, wet)
+        _strains(next(axes), series)
+        in_time = list(figure.axes[: 3 if wet else 2])
+        for ax in in_time:
+            _stages(ax, record)
+            ax.set_xlim(series["time"][0], max(series["time"][-1], np.nextafter(series["time"][0], np.inf)))
+            ax.set_xlabel("time, s")
+            ax.grid(alpha=0.3)
+            ax.legend()
+        if profiles is not None and len(profiles):
+            _profiles(next(axes), profiles, record, "pressure" if wet else "effective_stress")
+        for ax in axes:
+            ax.set_axis_off()
+        title = Path(record.path).stem if record.path else str(directory)
+        text = f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}"
+        figure.suptitle(text, parse_math=False)
     return figure
 
 
@@ -83,7 +99,7 @@ def _pressures(ax: Axes, series: np.ndarray) -> None:
 
 def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
     for wall in WALLS:
-        style: dict[str, Any] = {"color": _COLOURS[wall[0]], "ls": "-" if wall.endswith("max") else "--"}
+        style: dict[str, Any] = {"color": AXIS_COLOURS[wall[0]], "ls": "-" if wall.endswith("max") else "--"}
         ax.plot(series["time"], series[f"contact_stress_{wall}"], label=wall, **style)
         if wet:
             ax.plot(series["time"], series[f"total_stress_{wall}"], lw=3.0, alpha=0.3, **style)
@@ -91,7 +107,7 @@ def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
 
 
 def _strains(ax: Axes, series: np.ndarray) -> None:
-    for axis, colour in _COLOURS.items():
+    for axis, colour in AXIS_COLOURS.items():
         ax.plot(series["time"], 100.0 * series[f"strain_{axis}"], color=colour, label=f"strain {axis}")
     ax.set_ylabel("settlement, % of the side")
     ax.invert_yaxis()
@@ -103,7 +119,7 @@ def _stages(ax: Axes, record: RunRecord) -> None:
     for span in record.spans:
         ax.annotate(
             f" {span.name}", (span.begin, 0.99), xycoords=("data", "axes fraction"),
-            rotation=90, va="top", fontsize=8, color="0.4", parse_math=False,
+            rotation=90, va="top", fontsize=SMALL, color=PALE_INK, parse_math=False,
         )  # fmt: skip
 
 
@@ -118,10 +134,8 @@ def _profiles(ax: Axes, profiles: np.ndarray, record: RunRecord, quantity: str) 
     for time in times[np.unique(np.geomspace(1, len(times), _MOMENTS).round().astype(int)) - 1]:
         layers = found[found["time"] == time]
         ax.plot(layers[quantity], 0.5 * (layers["lower"] + layers["upper"]), ".-", label=f"{time:.4g} s")
-    ax.set_xlabel(
-        f"{quantity.replace('_', ' ')} by layer, Pa, in {record.spans[int(found['stage'][0]) - 1].name}",
-        parse_math=False,
-    )
+    stage = record.spans[int(found["stage"][0]) - 1].name
+    ax.set_xlabel(f"{quantity.replace('_', ' ')} by layer, Pa, in {stage}", parse_math=False)
     ax.set_ylabel("place across the layers, m")
     ax.grid(alpha=0.3)
-    ax.legend(fontsize=8)
+    ax.legend()

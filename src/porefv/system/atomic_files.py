@@ -109,11 +109,18 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def picture_target(path: str | PathLike[str]) -> Path:
-    """The path of a picture to be drawn; InputError, before it is, if no PNG file can be written there."""
+def picture_target(path: str | PathLike[str], endings: tuple[str, ...] = (".png",)) -> Path:
+    """The path of a picture to be drawn; InputError, before it is, if no such file can be written there.
+
+    Parameters
+    ----------
+    path : path
+    endings : tuple of str
+        Of the formats that the picture can have.
+    """
     path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"cannot write {path}: pictures are PNG files; give a name that ends in .png")
+    if path.suffix.lower() not in endings:
+        raise InputError(f"cannot write {path}: give a name that ends in {' or '.join(endings)}")
     if not path.absolute().parent.is_dir():
         raise InputError(f"cannot write {path}: there is no directory {path.absolute().parent}")
     return path

@@ -1,0 +1,44 @@
+"""The pictures of docs/plot.md and docs/img/n2000.png, by `porefv plot`.
+
+python docs/figures/plots.py
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from small_png import FOLDER, shrink
+
+from porefv.cli import main as porefv
+from porefv.scenes import FlowScene
+
+SCENES = Path(__file__).resolve().parents[2] / "data" / "scenes"
+PLOTS = {
+    "n2000": ("n2000", "--size", "1200x900", "--dpi", "150"),
+    "plot_network": ("n2000", "--what", "network"),
+    "plot_throats": ("n2000", "--what", "throats"),
+    "plot_section": ("n2000", "--what", "section"),
+    "plot_velocity": ("n2000", "--what", "velocity", "--size", "1200x900", "--dpi", "150"),
+    "plot_sc8": ("sc8", "--what", "network"),
+}
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in {scene for scene, *_ in PLOTS.values()}:
+            if status := porefv(["solve", str(SCENES / f"{scene}.toml"), "--force", "--quiet"]):
+                return status
+        for name, (scene, *options) in PLOTS.items():
+            path = Path(folder) / f"{name}.png"
+            directory = FlowScene.read(SCENES / f"{scene}.toml").output.directory
+            size = [] if "--size" in options else ["--size", "800x600", "--dpi", "100"]
+            if status := porefv(["plot", str(directory), "--out", str(path), *options, *size]):
+                return status
+            shrink(path, FOLDER / f"{name}.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

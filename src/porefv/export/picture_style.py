@@ -1,0 +1,224 @@
+"""The style of all pictures: colours, fonts, sizes, units of scales and round ticks.
+
+Pictures of grains and pores, diagrams of quantities and simulations, and the figures of the documentation use it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from porefv.errors import InputError
+from porefv.system.optional_imports import ensure_installed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Colours of things.
+INK, PALE_INK = "#222222", "#6b6b6b"
+GRAIN, GRAIN_SECTION = "#d9d4cc", "#ece8e1"
+FLOW = "#1f5a99"
+# Colours of curves: by number, by weight; one for each axis.
+BY_NUMBER, BY_WEIGHT = "tab:blue", "tab:orange"
+AXIS_COLOURS = {"x": "tab:green", "y": "tab:orange", "z": "tab:blue"}
+# Colour maps: families that are not taken for one another.
+FORCES, PRESSURES, SPEEDS = "YlOrRd", "viridis", "GnBu"
+# Part of a colour map that is used: ink remains visible on speeds.
+_UP_TO = {SPEEDS: 0.7}
+
+FONTS: Any = {
+    "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.0, "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0, "figure.titlesize": 10.0, "axes.linewidth": 0.6, "axes.edgecolor": INK,
+    "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK, "ytick.color": INK, "svg.fonttype": "none",
+    "svg.hashsalt": "porefv",  # the same picture is the same file
+    "font.family": "DejaVu Sans",
+}  # fmt: skip
+SMALL = 8.0  # points, of notes
+
+_PREFIXES = {
+    -24: "y", -21: "z", -18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G",
+    12: "T", 15: "P", 18: "E", 21: "Z", 24: "Y",
+}  # fmt: skip
+_POWERS = {"²": 2, "³": 3}
+# Of areas and volumes, steps of a thousand along a side are steps of a million or more.
+_SMALL_STEPS = {-2: "c", -1: "d"}
+
+
+class PictureSize(NamedTuple):
+    """Size of a picture.
+
+    Attributes
+    ----------
+    width, height : int
+        [pixels]
+    dpi : float
+        Pixels per inch: how large letters are, whose size is in points.
+    """
+
+    width: int = 1600
+    height: int = 1200
+    dpi: float = 200.0
+
+    @property
+    def inches(self) -> tuple[float, float]:
+        """Width and height in inches."""
+        return self.width / self.dpi, self.height / self.dpi
+
+    def check(self) -> PictureSize:
+        """The size itself; InputError if no picture can have it."""
+        if not (100 <= self.width <= 10_000 and 100 <= self.height <= 10_000):
+            raise InputError(
+                f"a picture must have 100 to 10 000 pixels along each side, not {self.width} x {self.height}"
+            )
+        if not 30 <= self.dpi <= 1200:
+            raise InputError(f"the resolution must be 30 to 1200 pixels per inch, not {self.dpi:g}")
+        return self
+
+
+SIZE = PictureSize()
+
+
+class Unit(NamedTuple):
+    """A unit with a prefix: `factor` times a value in SI units is the value in this unit."""
+
+    factor: float
+    name: str
+
+
+def unit_for(most: float, unit: str) -> Unit:
+    """The unit with the SI prefix in which values up to `most` have few digits.
+
+    Parameters
+    ----------
+    most : float
+        Largest size of a value, in the unit without a prefix.
+    unit : str
+        For instance "Pa", "m" or "m³/s"; the prefix is that of its first factor.
+
+    Examples
+    --------
+    >>> unit_for(0.0014, "N")
+    Unit(factor=1000.0, name='mN')
+    >>> unit_for(2e-7, "m³/s").name, unit_for(2e-6, "m³/s").name
+    ('mm³/s', 'cm³/s')
+    """
+    first = unit.split("/")[0]
+    power = _POWERS.get(first[-1], 1)
+    most = abs(most)
+    if not 1e-300 < most < 1e300:  # beyond, factors would overflow
+        return Unit(1.0, unit)
+    magnitude = math.log10(most)
+    prefixes = _PREFIXES | (_SMALL_STEPS if power > 1 else {})
+    # One to a thousand, or as near to it as prefixes are: 1000 Pa is 1 kPa.
+    exponent = min(prefixes, key=lambda each: (round(abs(magnitude - power * each - 1.5), 9), -each))
+    if abs(magnitude - power * exponent - 1.5) > 1.5 * power + 1e-6:
+        exponent = math.floor(magnitude)
+        return Unit(10.0**-exponent, f"10^{exponent} {unit}")
+    return Unit(10.0 ** (-exponent * power), f"{prefixes[exponent]}{unit}")
+
+
+def in_unit(value: float, unit: str, digits: int = 3) -> str:
+    """A value with its unit, as in a title: ``6.45 mPa``."""
+    scale = unit_for(value, unit)
+    return f"{value * scale.factor:.{digits}g} {scale.name}"
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above `most`."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most * (1.0 + 1e-9))
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Within the block, what matplotlib makes has the fonts, line widths and colours of porefv's pictures.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    ensure_installed("matplotlib", "matplotlib", "Drawing a picture")
+    from matplotlib import rc_context
+
+    with rc_context(FONTS):
+        yield
+
+
+def new_figure(size: PictureSize = SIZE, **options: Any) -> Figure:
+    """A white `matplotlib.figure.Figure` of a size; to be called within `style`."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size.inches, dpi=size.dpi, facecolor="white", **options)
+
+
+def round_ticks(axis: Any, most: int = 6) -> None:
+    """Put an axis' ticks at round values, `most` + 1 at the most."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
+
+
+class Colours(NamedTuple):
+    """A scale of colours.
+
+    Attributes
+    ----------
+    label : str
+        What is shown, without unit.
+    unit : Unit
+    low, high : float
+        Values at the ends, in the unit.
+    colour_map : str
+        Of matplotlib.
+    """
+
+    label: str
+    unit: Unit
+    low: float
+    high: float
+    colour_map: str
+
+    @classmethod
+    def over(cls, label: str, unit: str, low: float, high: float, colour_map: str) -> Colours:
+        """The scale from `low` to `high`, given in SI units without prefix; a single value is its middle."""
+        scale = unit_for(max(abs(low), abs(high)), unit)
+        low, high = low * scale.factor, high * scale.factor
+        if not high > low:
+            half = 0.5 * abs(low) if abs(low) > 1e-300 else 0.5
+            low, high = low - half, low + half
+        return cls(label, scale, low, high, colour_map)
+
+    @property
+    def map(self) -> Any:
+        """Matplotlib's colour map."""
+        from matplotlib import colormaps
+        from matplotlib.colors import LinearSegmentedColormap
+
+        whole = colormaps[self.colour_map]
+        if self.colour_map not in _UP_TO:
+            return whole
+        places = [_UP_TO[self.colour_map] * k / 255 for k in range(256)]
+        return LinearSegmentedColormap.from_list(self.colour_map, whole(places))
+
+    @property
+    def mappable(self) -> Any:
+        """Matplotlib's map from values in the unit to colours."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        return ScalarMappable(Normalize(self.low, self.high), self.map)
+
+    def of(self, values: Any) -> Any:
+        """(n, 4): colours of values in SI units without prefix."""
+        return self.mappable.to_rgba(values * self.unit.factor)
+
+    def draw(self, axes: Axes) -> None:
+        """Fill axes with the scale: its label above, its ticks at the right."""
+        bar = axes.figure.colorbar(self.mappable, cax=axes)  # type: ignore[union-attr]
+        round_ticks(bar.ax.yaxis, 5)
+        bar.ax.set_title(f"{self.label}, {self.unit.name}", loc="left", pad=7.0)
+        bar.outline.set_linewidth(0.0)  # type: ignore[operator]
