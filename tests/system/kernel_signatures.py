@@ -19,6 +19,7 @@ from porefv.system import threads
 from porefv.system.kernel_build import RECORD, recorded
 from porefv.system.kernel_types import types_text
 from porefv.system.kernels import all_kernels
+from porefv.transport.solute import Solute
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 
@@ -95,6 +96,7 @@ def run_everything(folder: Path) -> None:
         for model in (None, HydraulicRadius()):
             flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)
             flow.forces, flow.pore_velocity, flow.to_fipy().mesh
+    Solute(flow).advance(1.0)
 
 
 def run(folder: Path, command: str, name: str, text: str) -> None:
