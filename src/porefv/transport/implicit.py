@@ -7,15 +7,19 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, bicgstab, spilu, splu
+from scipy.sparse.linalg import splu
 
 from porefv.errors import ComputationError
 from porefv.transport.flow_order import Upstream, sweep
+from porefv.transport.incomplete_factor import Rows, bicgstab, factored, rows_of
 
 # Up to so many pores the matrix is factored; beyond, BiCGStab with an incomplete factor costs less.
 FACTOR_LIMIT = 20_000
-DROP = 1e-3  # entries of the incomplete factor below this part of their column are dropped
 TOLERANCE = 5e-15
+# Iterations of one correction. What it may leave of the imbalance is not asked to be smaller than this part: the
+# residual is computed anew for the next.
+_ITERATIONS = 200
+_LEAST_PART = 1e-9
 _CORRECTIONS = 20
 _EPSILON = float(np.finfo(float).eps)
 
@@ -73,11 +77,11 @@ class Implicit:
     def _correction(self, r: np.ndarray, allowed: float) -> np.ndarray:
         if len(r) <= FACTOR_LIMIT:
             return self._factor.solve(r)
-        # SciPy takes products below 5e-32 for a breakdown, whatever the units.
-        size = float(np.linalg.norm(r))
-        part = max(0.3 * allowed / float(np.abs(r).sum()), 1e-9)
-        dx, _ = bicgstab(self._matrix, r / size, rtol=part, atol=0.0, maxiter=1000, M=self._preconditioner)
-        return size * dx
+        order = self._upstream.order
+        part = max(0.3 * allowed / float(np.abs(r).sum()), _LEAST_PART)
+        found = np.empty(len(r))
+        found[order] = bicgstab(self._rows, self._incomplete, r[order], part, _ITERATIONS)[0]
+        return found
 
     @cached_property
     def _matrix(self) -> Any:
@@ -90,8 +94,14 @@ class Implicit:
         return sparse.csr_array(sparse.coo_array((values, (rows, columns)), shape=(n, n)))
 
     @cached_property
-    def _preconditioner(self) -> LinearOperator:
-        return LinearOperator(self._matrix.shape, self._factor.solve)
+    def _rows(self) -> Rows:
+        """The matrix in the order of the flow."""
+        order = self._upstream.order
+        return rows_of(sparse.csr_array(self._matrix[order][:, order]))
+
+    @cached_property
+    def _incomplete(self) -> Rows:
+        return factored(self._rows)
 
     @cached_property
     def _sizes(self) -> Any:
@@ -99,8 +109,6 @@ class Implicit:
 
     @cached_property
     def _factor(self) -> Any:
-        options: dict[str, Any] = {
-            "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}
-        }  # fmt: skip
-        matrix = self._matrix.tocsc()
-        return splu(matrix, **options) if matrix.shape[0] <= FACTOR_LIMIT else spilu(matrix, drop_tol=DROP, **options)
+        return splu(
+            self._matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )

@@ -21,10 +21,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from porefv.conductance.prism_sections import diffusive_conductances
-from porefv.errors import InputError
+from porefv.errors import InputError, counted
 from porefv.flow.pore_flow import PoreFlow
 from porefv.packing.box import WALLS
-from porefv.system.number_checks import ensure_finite
+from porefv.system.number_checks import ensure_finite, is_finite_number
 from porefv.transport.balanced_flow import BalancedFlow, balanced_flow
 from porefv.transport.flow_order import upstream_of
 from porefv.transport.implicit import TOLERANCE, Implicit
@@ -119,13 +119,23 @@ class Solute:
         grains = _numbers(grain_reaction, 1, "grain_reaction", "packing")[0]
         self.concentration = _numbers(initial, mesh.n_pores, "initial", "pore")
         self.volumes = mesh.pore_volumes
-        _ensure_positive(self.volumes, "void volume", "leave out what overlaps, or unite pores (unite_tolerance)", 0.0)
+        empty = np.flatnonzero(self.volumes <= 0.0)
+        if len(empty):
+            raise InputError(
+                f"{counted(len(empty), 'pore')}, the first of them {empty[0]}, would have no void volume: a solute needs "
+                "spheres that overlap less"
+            )
         faces = mesh.wall_faces
         beside = mesh.cell_pore[faces.cells]
         self.losses = np.bincount(beside, walls[faces.walls] * faces.areas, mesh.n_pores)
         if grains > 0.0:
             surfaces = mesh.pore_surfaces
-            _ensure_positive(surfaces, "surface of grains", "a reaction needs spheres that overlap less", -1e-300)
+            below = np.flatnonzero(surfaces < 0.0)
+            if len(below):
+                raise InputError(
+                    f"{counted(len(below), 'pore')}, the first of them {below[0]}, would have a surface of grains below "
+                    "zero: a reaction at grains needs spheres that overlap less"
+                )
             self.losses = self.losses + grains * surfaces
         self.carried: BalancedFlow = balanced_flow(flow)
         self.diffusion = given * diffusive_conductances(mesh.throats) if given.any() else np.zeros(len(mesh.throats))
@@ -162,7 +172,7 @@ class Solute:
         ComputationError
             If the equations are not solved to the tolerance.
         """
-        if not (np.isscalar(dt) and np.isfinite(dt) and dt > 0.0):
+        if not (is_finite_number(dt) and dt > 0.0):
             raise InputError(f"dt must be a positive time in seconds, not {dt!r}")
         if not (isinstance(steps, int) and steps >= 1):
             raise InputError(f"steps must be a whole number of at least 1, not {steps!r}")
@@ -254,10 +264,3 @@ def _by_name(values: float | Mapping[str, float], names: tuple[str, ...], what: 
             raise InputError(f"{what} has no {name!r}: it may have {', '.join(names)}")
     return np.array([_numbers(values.get(name, 0.0), 1, f"{what} of {name}", "name")[0] for name in names])
 
-
-def _ensure_positive(values: np.ndarray, what: str, remedy: str, least: float) -> None:
-    wrong = np.flatnonzero(~(values > least))
-    if len(wrong):
-        raise InputError(
-            f"{len(wrong)} pores, the first of them {wrong[0]}, have a {what} of {values[wrong[0]]:g}: {remedy}"
-        )
