@@ -30,7 +30,16 @@ def test_what_a_viewer_cannot_show_is_refused(mesh_of, tmp_path):
     c, d = (fipy.CellVariable(mesh=fluid, name="c") for _ in range(2))
     with pytest.raises(InputError, match="on one FluidMesh"):
         viewer.PoreViewer(vars=fipy.CellVariable(mesh=fipy.Grid3D(nx=2, ny=2, nz=2)))
-    with pytest.raises(InputError, match="different names, not c, c"):
+    with pytest.raises(InputError, match="different names, other than pore, not c, c"):
         viewer.PoreViewer(vars=[c, d])
     with pytest.raises(InputError, match=r"writes .vtu and .png files"):
         viewer.PoreViewer(vars=c).plot(tmp_path / "c.jpg")
+
+
+def test_any_name_can_be_written(mesh_of, tmp_path):
+    fluid = mesh_of("n25_s1").to_fipy()
+    c = fipy.CellVariable(mesh=fluid, name='c & "T" <hot>', value=fluid.x)
+    viewer.PoreViewer(vars=c).plot(tmp_path / "found.vtu")
+    assert 'c & "T" <hot>' in pyvista.read(tmp_path / "found.vtu").cell_data
+    with pytest.raises(InputError, match="shows scalars and vectors of cells"):
+        viewer.PoreViewer(vars=c.faceValue)

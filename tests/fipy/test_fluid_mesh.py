@@ -291,3 +291,10 @@ def test_the_extents_are_those_of_the_box(mesh_of):
     mesh = mesh_of("n25_s1")
     assert_allclose(mesh.to_fipy().extents["min"], mesh.box.lower, atol=1e-14)
     assert_allclose(mesh.to_fipy().extents["max"], mesh.box.upper, atol=1e-14)
+
+
+def test_only_exterior_faces_count_for_what_is_carried_out(mesh_of):
+    fluid = mesh_of("n54_s1").to_fipy()
+    vector = fipy.FaceVariable(mesh=fluid, rank=1, value=fluid.faceNormals)
+    everywhere = fipy.FaceVariable(mesh=fluid, value=True)
+    assert fluid.through(vector, everywhere) == pytest.approx(6.0)

@@ -74,3 +74,36 @@ def test_a_sound_equation_is_solved_without_a_word(fluid, solute):
         equation.solve(var=solute, dt=0.1)
     assert solute.value.min() >= -1e-12
     assert solute.value.max() <= 1.0 + 1e-12
+
+
+def test_a_uniform_velocity_on_faces_is_warned_of(fluid, solute):
+    velocity = fipy.FaceVariable(mesh=fluid.mesh, rank=1, value=[[0.0], [1e-3], [0.0]])
+    equation = fipy.TransientTerm() + fipy.UpwindConvectionTerm(coeff=velocity) == 0.0
+    with pytest.warns(TransportWarning, match="pores gain or lose"):
+        equation.solve(var=solute, dt=1e-3)
+
+
+def test_conditions_are_looked_at_again_when_they_change(fluid, solute):
+    equation = fipy.TransientTerm() + fipy.UpwindConvectionTerm(coeff=fluid.velocity) == 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        equation.solve(var=solute, dt=1e-3)
+    without = fipy.CellVariable(mesh=fluid.mesh, name="d")
+    with pytest.warns(TransportWarning, match="d has no condition"):
+        equation.solve(var=without, dt=1e-3)
+    loose = fipy.CellVariable(mesh=fluid.mesh, name="e")
+    loose.faceGrad.constrain(np.zeros((3, 1)), where=fluid.mesh.exteriorFaces)
+    with pytest.warns(TransportWarning, match="e has no value on .* through which fluid enters"):
+        equation.solve(var=loose, dt=1e-3)
+
+
+def test_an_equation_belongs_to_one_mesh(fluid, mesh_of):
+    equation = fipy.TransientTerm() == fipy.DiffusionTerm(coeff=1.0)
+    equation.solve(var=fipy.CellVariable(mesh=fluid.mesh), dt=1.0)
+    with pytest.raises(InputError, match="solved on another mesh"):
+        equation.solve(var=fipy.CellVariable(mesh=mesh_of("n54_s1").to_fipy()), dt=1.0)
+
+
+def test_plain_constraints_of_a_fourth_order_term_are_warned_of(fluid, solute):
+    with pytest.warns(TransportWarning, match="does not reach a DiffusionTerm of order 4"):
+        (fipy.TransientTerm() == -fipy.DiffusionTerm(coeff=(1e-4, 1.0))).solve(var=solute, dt=1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -53,8 +54,13 @@ class PoreViewer(fipy.viewers.viewer.AbstractViewer):  # type: ignore[name-defin
             raise InputError("a PoreViewer shows CellVariables on one FluidMesh, such as PoreMesh.to_fipy() makes")
         self._mesh: FluidMesh = self.vars[0].mesh
         names = self._names()
-        if len(set(names)) < len(names):
-            raise InputError(f"variables of a viewer must have different names, not {', '.join(names)}")
+        for name, var in zip(names, self.vars, strict=True):
+            if not isinstance(var, fipy.CellVariable) or var.rank > 1:
+                raise InputError(f"a PoreViewer shows scalars and vectors of cells, and {name} is {type(var).__name__}")
+        if len({*names, "pore"}) < len(names) + 1:
+            raise InputError(
+                f"variables of a viewer must have different names, other than pore, not {', '.join(names)}"
+            )
 
     def _names(self) -> list[str]:
         return [str(var.name) or f"variable {k}" for k, var in enumerate(self.vars)]
@@ -81,12 +87,15 @@ class PoreViewer(fipy.viewers.viewer.AbstractViewer):  # type: ignore[name-defin
         filename : str or Path, optional
             Written whole or not at all.
         """
-        if filename is not None and Path(filename).suffix == ".vtu":
-            grid = cells_grid(self._mesh.pore_mesh, **self._fields())
+        kind = "" if filename is None else Path(filename).suffix
+        if filename is not None and kind == ".vtu":
+            # VTK writes names as they are, and reads them as XML.
+            fields = {escape(name, {'"': "&quot;"}): values for name, values in self._fields().items()}
+            grid = cells_grid(self._mesh.pore_mesh, **fields)
             with atomic_write(Path(filename)) as path:
                 write_xml(grid, path)
             return
-        if filename is not None and Path(filename).suffix != ".png":
+        if filename is not None and kind != ".png":
             raise InputError(f"{filename}: a PoreViewer writes .vtu and .png files")
         plotter = load_pyvista().Plotter(off_screen=filename is not None)
         plotter.add_mesh(

@@ -23,8 +23,15 @@ from fipy.variables.gaussCellGradVariable import _GaussCellGradVariable  # noqa:
 
 _SOLVER_PARAMETERS = ["self", "var", "solver", "args", "kwargs"]
 
-_gradient_of_fipy: Any = getattr(_GaussCellGradVariable, "_calcValue", None)
-_solver_of_fipy: Any = getattr(Term, "getDefaultSolver", None)
+
+def _of_fipy(owner: Any, name: str) -> Any:
+    """FiPy's own function, also where this module has replaced it and is loaded once more."""
+    found = getattr(owner, name, None)
+    return getattr(found, "of_fipy", found)
+
+
+_gradient_of_fipy = _of_fipy(_GaussCellGradVariable, "_calcValue")
+_solver_of_fipy = _of_fipy(Term, "getDefaultSolver")
 
 
 def _gradient(self: Any) -> Any:
@@ -38,6 +45,10 @@ def _solver(self: Any, var: Any = None, solver: Any = None, *args: Any, **kwargs
     if of_mesh is not None:
         solver = of_mesh(self, variable, solver)
     return _solver_of_fipy(self, var, solver, *args, **kwargs)
+
+
+_gradient.of_fipy = _gradient_of_fipy  # type: ignore[attr-defined]
+_solver.of_fipy = _solver_of_fipy  # type: ignore[attr-defined]
 
 
 def install() -> None:

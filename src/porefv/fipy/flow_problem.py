@@ -13,6 +13,7 @@ from porefv.fipy.faces import CLOSED
 from porefv.fipy.fipy_import import load_fipy
 from porefv.fipy.fluid_mesh import FluidMesh
 from porefv.flow.pore_flow import PoreFlow
+from porefv.solvers.pressure_equation import reached, solve_isolated
 
 fipy = load_fipy()
 
@@ -97,24 +98,34 @@ class FlowProblem:
     def mobility(self) -> Any:
         """`fipy.FaceVariable` K L / A [m²/(Pa s)], with which `DiffusionTerm(mobility)` has the conductances K.
 
-        A closed throat has 2.2e-16 of the mean conductance for its area: isolated pores take the pressure of what
-        surrounds them. Faces on walls have 1e7 times the conductance of their pore's throats.
+        A closed throat has 2.2e-16 of the mean conductance for its area, so that isolated pores take a pressure among
+        those that surround them; `equation` does without. Faces on walls have 1e7 times the conductance of their
+        pore's throats.
         """
+        return self._mobility_of(self._open_conductances)
+
+    def _mobility_of(self, conductances: np.ndarray) -> Any:
+        """K L / A of each face, from those of the throats (t,)."""
         mesh = self.mesh
         first = mesh.pores[mesh.faceCellIDs[0]]
         on_walls = AT_WALLS * self._conductance_of_pores[first]
-        values = np.where(mesh.throats >= 0, self._open_conductances[mesh.throats], on_walls)
+        values = np.where(mesh.throats >= 0, conductances[mesh.throats], on_walls)
         values[-1] = 0.0
         return fipy.FaceVariable(
             mesh=mesh, value=values * mesh._cellDistances / np.asarray(mesh._faceAreas), name="mobility"
         )
 
     @cached_property
+    def _isolated(self) -> np.ndarray:
+        """(n_pores,) bool: pores that no open throat joins to a pore of imposed pressure."""
+        held = ~np.isnan(self.flow.imposed_pressures)
+        return ~reached(self.flow.mesh.throats.pores, self.flow.conductances, held)
+
+    @cached_property
     def _open_conductances(self) -> np.ndarray:
         """(t,): K of each throat, of a closed one too little to pass anything [m³/(Pa s)]."""
         areas, conductances = np.abs(self.flow.mesh.throats.areas), self.flow.conductances
-        floor = CLOSED * conductances.mean() / areas.mean()
-        return np.maximum(conductances, floor * areas)
+        return np.maximum(conductances, CLOSED * conductances.mean() / areas.mean() * areas)
 
     @cached_property
     def _conductance_of_pores(self) -> np.ndarray:
@@ -152,19 +163,24 @@ class FlowProblem:
 
     @cached_property
     def equation(self) -> Any:
-        """`fipy.DiffusionTerm(mobility) == 0`, with sources, and fixed pressures inside: solved with `var=pressure`."""
+        """`fipy.DiffusionTerm(mobility) == 0`, with sources, and fixed pressures inside: solved with `var=pressure`.
+
+        Closed throats pass nothing at all. Isolated pores, whose pressure the equation then does not determine, are
+        tied to the mean of the imposed pressures.
+        """
         mesh, flow = self.mesh, self.flow
+        diffusion = fipy.DiffusionTerm(coeff=self._mobility_of(flow.conductances))
         sources = fipy.CellVariable(mesh=mesh, value=flow.flow_of_sources[mesh.pores] / mesh.cellVolumes)
         on_walls = flow.mesh.pore_walls & sum(1 << wall for wall in np.flatnonzero(flow.walls_at_pressures.held))
         fixed = (~np.isnan(flow.imposed_pressures) & (on_walls == 0))[mesh.pores]
-        if not fixed.any():
-            return fipy.DiffusionTerm(coeff=self.mobility) == -sources
-        leak = np.where(fixed, AT_WALLS * self._conductance_of_pores[mesh.pores] / mesh.cellVolumes, 0.0)
-        leak = fipy.CellVariable(mesh=mesh, value=leak)
-        imposed = fipy.CellVariable(mesh=mesh, value=np.nan_to_num(flow.imposed_pressures[mesh.pores]))
-        return (
-            fipy.DiffusionTerm(coeff=self.mobility) - fipy.ImplicitSourceTerm(coeff=leak) == -sources - leak * imposed
-        )
+        isolated = self._isolated[mesh.pores]
+        if not (fixed | isolated).any():
+            return diffusion == -sources
+        leak = np.where(fixed, AT_WALLS * self._conductance_of_pores[mesh.pores], 0.0)
+        leak = np.where(isolated, flow.conductances.mean(), leak) / mesh.cellVolumes
+        imposed = np.where(fixed, flow.imposed_pressures[mesh.pores], np.nanmean(flow.imposed_pressures))
+        leak, imposed = (fipy.CellVariable(mesh=mesh, value=values) for values in (leak, imposed))
+        return diffusion - fipy.ImplicitSourceTerm(coeff=leak) == -sources - leak * imposed
 
     def velocity_with(self, mobility: Any) -> Any:
         """Velocity of `pressure` with a mobility, as a rank-1 `fipy.FaceVariable` that follows both [m/s].
@@ -183,6 +199,8 @@ class FlowProblem:
     def solve(self, **options: object) -> np.ndarray:
         """Solve the pressure equation; the pressure of each pore, (n_pores,), those left out included [Pa].
 
+        Isolated pores have the pressures that porefv gives them (`porefv.solvers.solve_network`).
+
         Parameters
         ----------
         **options
@@ -191,6 +209,10 @@ class FlowProblem:
         self.equation.solve(var=self.pressure, **options)
         found = self.flow.imposed_pressures.copy()
         found[self.mesh.pores] = self.pressure.value
+        throats, held = self.flow.mesh.throats, ~np.isnan(self.flow.imposed_pressures)
+        if self._isolated.any():
+            rest = np.zeros(len(found))
+            solve_isolated(throats.pores, self._isolated, held, found, rest, links=lambda: throats.areas)
         return found
 
 
@@ -201,6 +223,10 @@ class _VelocityOfPressure(fipy.FaceVariable):  # type: ignore[name-defined]
         super().__init__(mesh=pressure.mesh, rank=1, name="velocity")
         self._pressure, self._mobility = self._requires(pressure), self._requires(mobility)
         self._held = held
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as the values that it has."""
+        return _on_faces, (self.mesh, self.value.copy(), self.name)
 
     def _calcValue(self) -> np.ndarray:
         mesh = self.mesh
@@ -216,3 +242,7 @@ class _VelocityOfPressure(fipy.FaceVariable):  # type: ignore[name-defined]
         shares = areas[on_walls] / np.bincount(first[on_walls], areas[on_walls], mesh.numberOfCells)[first[on_walls]]
         flux[on_walls] = -shares * given[first[on_walls]]
         return flux / areas * mesh.faceNormals
+
+
+def _on_faces(mesh: FluidMesh, value: np.ndarray, name: str) -> Any:
+    return fipy.FaceVariable(mesh=mesh, rank=1, value=value, name=name)

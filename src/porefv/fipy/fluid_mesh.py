@@ -7,7 +7,6 @@ Equations in FiPy then read as in a textbook, without factors of geometry in the
 from __future__ import annotations
 
 import warnings
-import weakref
 from collections.abc import Collection
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -19,7 +18,7 @@ from porefv.fipy.faces import CLOSED, faces_of_cells, faces_of_fluid, walls_left
 from porefv.fipy.fipy_import import load_fipy
 from porefv.fipy.fipy_patches import install
 from porefv.fipy.gradient import LeastSquaresGradient
-from porefv.fipy.pore_solver import PoreSolver
+from porefv.fipy.pore_solver import Factors, PoreSolver
 from porefv.fipy.term_checks import check_terms
 from porefv.mesh.polyhedra import polygons
 from porefv.packing.box import WALLS
@@ -128,7 +127,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
             raise InputError("every pore is on a wall left out: nothing is left to solve for")
         self.pore_mesh = pore_mesh
         self._gradients: dict[bytes, LeastSquaresGradient] = {}
-        self._checked: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._factors = Factors()
         self.without = tuple(WALLS[wall] for wall in left_out)
         self.pores = np.flatnonzero(kept)
         self._given = given = faces_of_fluid(pore_mesh, kept, left_out)
@@ -318,7 +317,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
 
     def through(self, vector: Any, where: Any) -> float:
         """What a rank-1 FaceVariable carries out through the exterior faces of a mask."""
-        mask = np.asarray(where.value if hasattr(where, "value") else where, bool)
+        mask = np.asarray(where.value if hasattr(where, "value") else where, bool) & self.exteriorFaces.value
         return float(self.flux(vector)[mask].sum())
 
     @cached_property
@@ -338,6 +337,8 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         """(3, ..., c): gradient of a CellVariable by least squares over neighbouring pores; exact for linear fields.
 
         It is what `variable.grad` gives. Values that are given on faces towards pores left out count as neighbours.
+        Where they are not given, and the neighbours that are left do not span space, the gradient has no part normal to
+        them.
         """
         value = np.asarray(variable.numericValue, float)
         on_faces = np.asarray(variable.arithmeticFaceValue.numericValue)[..., : self._n_faces]
@@ -364,17 +365,10 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
 
     # ---- what FiPy asks for an equation, once patched ---------------------------------------------------------------
 
-    @cached_property
-    def solver(self) -> PoreSolver:
-        """The solver of equations on this mesh for which no other is named: it keeps factors between solutions."""
-        return PoreSolver()
-
     def solver_for(self, equation: Any, variable: Any, named: Any) -> Any:
-        """The solver named, or the mesh's own; the terms of an equation are looked at when it is first solved."""
-        if equation not in self._checked:
-            check_terms(equation, variable)
-            self._checked.add(equation)
-        return named or self.solver
+        """The solver named, or a PoreSolver that shares the mesh's factors; the equation's terms are looked at."""
+        check_terms(equation, variable)
+        return named or PoreSolver(factors=self._factors)
 
     # ---- what FiPy's meshes of vertices can do -----------------------------------------------------------------------
 

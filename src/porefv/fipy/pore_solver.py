@@ -7,6 +7,7 @@ what passes through them, and has an error where that is not small.
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,11 +36,45 @@ FACTOR_LIMIT = 20_000
 DROP = 1e-3
 # A sum over a row of the matrix below this part of its diagonal is rounding.
 ROUNDING = 1e-14
-# Matrices whose factors are kept: a few equations that are solved in turn.
-KEPT = 4
+# Matrices whose factors are kept: two equations that are solved in turn.
+KEPT = 2
+# Leaks that are too small to be told from rounding may be this part of all.
+UNCERTAIN = 1e-6
 _EPSILON = float(np.finfo(float).eps)
 _RESTARTS = 20
 _CORRECTIONS = 5
+
+
+class Factors:
+    """The last `KEPT` matrices, made ready to be solved: equal matrices are found again. Threads may share it."""
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[Any, _Symmetric | _General]] = []
+        self._lock = threading.Lock()
+
+    def of(self, matrix: Any, n_cells: int) -> _Symmetric | _General:
+        """A matrix made ready, or what is kept of it.
+
+        Parameters
+        ----------
+        matrix : (n, n) csr_array
+        n_cells : int
+            Of the mesh: an equation for several unknowns has as many blocks of rows.
+        """
+        for kept, ready in self._kept:
+            if (
+                kept.nnz == matrix.nnz
+                and np.array_equal(kept.indptr, matrix.indptr)
+                and np.array_equal(kept.indices, matrix.indices)
+                and np.array_equal(kept.data, matrix.data)
+            ):
+                return ready
+        if not np.isfinite(matrix.data).all():
+            raise ComputationError("the matrix of the equation is not finite: look at its coefficients")
+        ready = _made_ready(matrix.copy(), n_cells)
+        with self._lock:
+            self._kept = [(matrix.copy(), ready), *self._kept[: KEPT - 1]]
+        return ready
 
 
 class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[name-defined]
@@ -55,6 +90,8 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
     tolerance : float
         Largest Σ|b - A x|, relative to the flow: half of what enters and leaves the unknowns, ½ Σ|e x - b| with e the
         sums of the matrix's columns.
+    factors : Factors, optional
+        Where factors are kept; solvers may share them.
     iterations : int
         Most iterations. Where BiCGStab needs more, a warning (`PorefvWarning`) says so, and the matrix is factored.
 
@@ -76,11 +113,13 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
     True
     """
 
-    def __init__(self, tolerance: float = TOLERANCE, iterations: int = 1000, **_: object):
+    def __init__(
+        self, tolerance: float = TOLERANCE, iterations: int = 1000, factors: Factors | None = None, **_: object
+    ):
         if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
             raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
         super().__init__(tolerance=tolerance, iterations=iterations, criterion="unscaled", precon=None)
-        self._kept: list[tuple[Any, _Symmetric | _General]] = []
+        self._factors = Factors() if factors is None else factors
 
     @property
     def _Lxb(self) -> Any:  # FiPy's name
@@ -94,38 +133,25 @@ class PoreSolver(fipy.solvers.scipy.scipySolver.ScipySolver):  # type: ignore[na
 
     def _solve_(self, L: Any, x: np.ndarray, b: np.ndarray) -> np.ndarray:  # FiPy's names
         matrix = sp.csr_array(L)
-        ready = self._factored(matrix)
         x = np.ascontiguousarray(x, float)
         if not (np.isfinite(b).all() and np.isfinite(x).all()):
             raise ComputationError("the right-hand side, or the value that the variable has, is not finite")
-        x, iterations = ready.solve(ready.sign * np.asarray(b, float), x, self.tolerance, self.iterations)
-        lost, flow, floor = ready.imbalance(ready.sign * b, x)
-        if not lost <= max(self.tolerance * flow, floor):
+        ready = self._factors.of(matrix, self.var.mesh.numberOfCells)
+        with ready.lock:
+            x, iterations = ready.solve(ready.sign * np.asarray(b, float), x, self.tolerance, self.iterations)
+            lost, flow, floor = ready.imbalance(ready.sign * b, x)
+        wrong = np.flatnonzero(~(lost <= np.maximum(self.tolerance * flow, floor)))
+        if len(wrong):
+            k = wrong[0]
             raise ComputationError(
-                f"the solver stopped after {iterations} iterations with Σ|b - A x| at {_ratio(lost, flow):.1e} of the "
-                f"flow (asked: {self.tolerance:.1e}); try smaller time steps, or FiPy's LinearLUSolver"
+                f"the solver stopped after {iterations} iterations with Σ|b - A x| at {_ratio(lost[k], flow[k]):.1e} "
+                f"of the flow (asked: {self.tolerance:.1e}); try smaller time steps, or FiPy's LinearLUSolver"
             )
         unit = abs(ready.sign)
         self._setConvergence(
-            suite="scipy", code=0, iterations=iterations, residual=lost / unit, tolerance_scale=flow / unit
+            suite="scipy", code=0, iterations=iterations, residual=lost.sum() / unit, tolerance_scale=flow.sum() / unit
         )
         return x
-
-    def _factored(self, matrix: Any) -> _Symmetric | _General:
-        """The matrix made ready, or what is kept of it."""
-        for kept, ready in self._kept:
-            if (
-                kept.nnz == matrix.nnz
-                and np.array_equal(kept.indptr, matrix.indptr)
-                and np.array_equal(kept.indices, matrix.indices)
-                and np.array_equal(kept.data, matrix.data)
-            ):
-                return ready
-        if not np.isfinite(matrix.data).all():
-            raise ComputationError("the matrix of the equation is not finite: look at its coefficients")
-        ready = _made_ready(matrix.copy())
-        self._kept = [(matrix.copy(), ready), *self._kept[: KEPT - 1]]
-        return ready
 
     def _canSolveAsymmetric(self) -> bool:
         return True
@@ -165,7 +191,7 @@ def _ratio(lost: float, flow: float) -> float:
     return lost / flow if flow > 0.0 else np.inf
 
 
-def _made_ready(matrix: Any) -> _Symmetric | _General:
+def _made_ready(matrix: Any, n_cells: int) -> _Symmetric | _General:
     matrix.sum_duplicates()
     diagonal = matrix.diagonal()
     sign = -1.0 if diagonal.sum() < 0.0 else 1.0
@@ -176,8 +202,25 @@ def _made_ready(matrix: Any) -> _Symmetric | _General:
     m_matrix = (diagonal > 0.0).all() and (off.data <= 0.0).all() and (sums >= -ROUNDING * diagonal).all()
     difference = abs(off - off.T)
     if m_matrix and (difference.nnz == 0 or difference.max() <= ROUNDING * abs(off).max()):
-        return _Symmetric(matrix, off, np.where(sums > ROUNDING * diagonal, sums, 0.0), sign)
-    return _General(matrix, sign)
+        return _Symmetric(matrix, off, _certain(matrix, sums, diagonal), sign)
+    return _General(matrix, sign, n_cells)
+
+
+def _certain(matrix: Any, sums: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
+    """(n,): sums of rows, zero where they are at the level of rounding; ComputationError if those are much of all."""
+    count, part = connected_components(matrix, directed=False)
+    known = sums > ROUNDING * diagonal
+    kept = np.bincount(part, np.where(known, sums, 0.0), count)
+    lost = np.bincount(part, np.where(known, 0.0, np.maximum(sums, 0.0)), count)
+    vague = np.flatnonzero((kept > 0.0) & (lost > UNCERTAIN * kept))
+    if len(vague):
+        members = np.flatnonzero(part == vague[0])
+        raise ComputationError(
+            f"{counted(len(members), 'unknown')}, the first of them {members[0]}, are tied down by sinks or steps of "
+            f"time, of which rounding of the matrix hides {lost[vague[0]] / kept[vague[0]]:.0e}: take smaller steps of "
+            "time, or give a value on a wall"
+        )
+    return np.where(known, sums, 0.0)
 
 
 def _ensure_determined(matrix: Any, leaks: np.ndarray) -> None:
@@ -198,7 +241,7 @@ class _Symmetric:
 
     def __init__(self, matrix: Any, off: Any, leaks: np.ndarray, sign: float):
         _ensure_determined(matrix, leaks)
-        self.sign = sign
+        self.sign, self.lock = sign, threading.Lock()
         links = sp.csr_array(-0.5 * (off + off.T))
         links.sort_indices()
         weights = np.ascontiguousarray(links.data)
@@ -209,8 +252,11 @@ class _Symmetric:
 
     @cached_property
     def _factor(self) -> DirectFactor | ApproximateCholesky:
-        network = self._network
-        return DirectFactor(network) if len(network) <= DIRECT_LIMIT else ApproximateCholesky.of(network)
+        return DirectFactor(self._network) if len(self._network) <= DIRECT_LIMIT else self._approximate
+
+    @cached_property
+    def _approximate(self) -> ApproximateCholesky:
+        return ApproximateCholesky.of(self._network)
 
     def solve(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
         x, iterations = conjugate_gradients(self._network, b, self._factor, tolerance, x, limit)
@@ -225,22 +271,27 @@ class _Symmetric:
         leaks = self._network.leaks
         held = np.divide(b, leaks, out=np.zeros(len(b)), where=leaks > 0.0)
         sources = np.where(leaks > 0.0, 0.0, b)
-        found = refined(self._network, held, sources, self._factor, tolerance, accuracy)
+        found = refined(self._network, held, sources, self._approximate, tolerance, accuracy)
+        if not found.error <= accuracy:
+            raise ComputationError(
+                f"values are uncertain by {PRESSURE_TOLERANCE * found.error / accuracy:.1e} of their range: some pores "
+                "are joined to the rest by coefficients too many decades below the others"
+            )
         return found.x + found.rest, iterations + found.iterations
 
-    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
-        """Σ|b - A x|, the flow, and what rounding of x alone may lose."""
+    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Σ|b - A x|, the flow, and what rounding of x alone may lose, (1,) each."""
         network = self._network
-        lost = float(np.abs(network.residual(b, x)).sum())
-        flow = 0.5 * float(np.abs(network.leaks * x - b).sum())
-        return lost, flow, 2.0 * _EPSILON * float((network.diagonal * np.abs(x)).sum())
+        lost = np.abs(network.residual(b, x)).sum(keepdims=True)
+        flow = 0.5 * np.abs(network.leaks * x - b).sum(keepdims=True)
+        return lost, flow, 2.0 * _EPSILON * (network.diagonal * np.abs(x)).sum(keepdims=True)
 
 
 class _General:
     """Any other matrix: a sparse factor, or an incomplete one and BiCGStab."""
 
-    def __init__(self, matrix: Any, sign: float):
-        self._sizes = abs(matrix)
+    def __init__(self, matrix: Any, sign: float, n_cells: int):
+        self._sizes, self._n_cells, self.lock = abs(matrix), n_cells, threading.Lock()
         empty = np.flatnonzero(self._sizes.sum(axis=1) == 0.0)
         if len(empty):
             raise ComputationError(
@@ -287,7 +338,7 @@ class _General:
         if not self._insufficient:
             first = self._by_factor if self._direct else self._by_iteration
             x, iterations = first(b, x, tolerance, limit)
-            if self._enough(b, x, tolerance):
+            if self._excess(b, x, tolerance) <= 1.0:
                 return x, iterations
             self._insufficient = True
             if not self._direct:
@@ -310,16 +361,15 @@ class _General:
         while count < _CORRECTIONS:
             count += 1
             x = x + factor.solve(b - self._matrix @ x)
-            lost = float(np.abs(b - self._matrix @ x).sum())
-            if not lost < 0.5 * least:
+            excess = self._excess(b, x, 0.01 * tolerance)
+            if not excess < 0.5 * least:
                 break
-            best, least = x, lost
-            if self._enough(b, x, 0.01 * tolerance):
+            best, least = x, excess
+            if excess <= 1.0:
                 break
         return best, count
 
     def _by_iteration(self, b: np.ndarray, x: np.ndarray, tolerance: float, limit: int) -> tuple[np.ndarray, int]:
-        preconditioner = LinearOperator(self._matrix.shape, self._factor.solve)
         done = [0]
 
         def count(_: np.ndarray) -> None:
@@ -327,28 +377,41 @@ class _General:
 
         before = np.inf
         for _ in range(_RESTARTS):
-            r = b - self._matrix @ x
-            lost, flow, floor = self.imbalance(b, x)
-            target = max(tolerance * flow, floor)
-            if lost <= target or not lost < 0.9 * before or done[0] >= limit:
+            excess = self._excess(b, x, tolerance)
+            if excess <= 1.0 or not excess < 0.9 * before or done[0] >= limit:
                 break
-            before = lost
+            before = excess
+            # Each unknown in the unit of what its block may lose: a trace counts as much as what it is a trace of.
+            _, flow, floor = self.imbalance(b, x)
+            allowed = np.maximum(tolerance * flow, floor)
+            unit = np.repeat(np.where(allowed > 0.0, allowed, allowed.max()), len(b) // len(allowed))
+            scale = sp.diags_array(unit)
+            matrix = sp.diags_array(1.0 / unit) @ self._matrix @ scale
+            preconditioner = LinearOperator(
+                matrix.shape, lambda v, unit=unit: self._factor.solve(unit * v.ravel()) / unit
+            )
+            r = (b - self._matrix @ x) / unit
+            size = float(np.linalg.norm(r))
             # What is lost is a sum over the unknowns, of which BiCGStab's norm knows the root of the squares.
-            part = max(0.5 * target / lost, 1e-12) / np.sqrt(len(b)) * lost / (size := float(np.linalg.norm(r)))
+            part = max(0.5 / np.sqrt(len(b)) / size, 1e-12)
             dx, _code = bicgstab(
-                self._matrix, r / size, rtol=part, atol=0.0, maxiter=limit - done[0], M=preconditioner, callback=count
+                matrix, r / size, rtol=part, atol=0.0, maxiter=limit - done[0], M=preconditioner, callback=count
             )
             if not np.isfinite(dx).all():
                 break
-            x = x + size * dx
+            x = x + size * unit * dx
         return x, done[0]
 
-    def _enough(self, b: np.ndarray, x: np.ndarray, tolerance: float) -> bool:
+    def _excess(self, b: np.ndarray, x: np.ndarray, tolerance: float) -> float:
+        """What a block loses over what it may lose, of the worst block; 1 or less if all is well."""
         lost, flow, floor = self.imbalance(b, x)
-        return bool(lost <= max(tolerance * flow, floor))
+        allowed = np.maximum(tolerance * flow, floor)
+        excess = np.divide(lost, allowed, out=np.where(lost > 0.0, np.inf, 0.0), where=allowed > 0.0)
+        return float(excess.max())
 
-    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
-        """Σ|b - A x|, the flow, and what rounding of x alone may lose."""
-        lost = float(np.abs(b - self._matrix @ x).sum())
-        flow = 0.5 * float(np.abs(self._leaks * x - b).sum())
-        return lost, flow, 2.0 * _EPSILON * float((self._sizes @ np.abs(x)).sum())
+    def imbalance(self, b: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Σ|b - A x|, the flow, and what rounding of x alone may lose, (k,) each: of each variable of the equation."""
+        blocks = len(b) // self._n_cells if len(b) % self._n_cells == 0 else 1
+        lost, flow, size = np.abs(b - self._matrix @ x), np.abs(self._leaks * x - b), self._sizes @ np.abs(x)
+        lost, flow, size = (values.reshape(blocks, -1).sum(axis=1) for values in (lost, flow, size))
+        return lost, 0.5 * flow, 2.0 * _EPSILON * size

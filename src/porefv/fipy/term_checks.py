@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+import weakref
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,12 +20,17 @@ from fipy.variables.cellToFaceVariable import _CellToFaceVariable  # noqa: E402
 
 # A flux below this part of the largest one is rounding.
 _NOTHING = 1e-9
-# Who calls solve() or sweep(), as seen from a check.
-_CALLER = 7
+# What pores may gain or lose of all that passes them, in a velocity that is free of divergence.
+_DIVERGENCE = 1e-2
+# Who calls solve() or sweep(), as seen from a warning.
+_CALLER = 6
+
+_told: weakref.WeakKeyDictionary[Any, set[str]] = weakref.WeakKeyDictionary()
+_meshes: weakref.WeakKeyDictionary[Any, weakref.ref[Any]] = weakref.WeakKeyDictionary()
 
 
 def check_terms(equation: Any, variable: Any) -> None:
-    """Refuse terms that are wrong on the fluid in pores; warn of those that mostly are.
+    """Refuse terms that are wrong on the fluid in pores; warn of those that mostly are, once for each equation.
 
     Parameters
     ----------
@@ -35,19 +41,33 @@ def check_terms(equation: Any, variable: Any) -> None:
     Raises
     ------
     InputError
-        For a VanLeerConvectionTerm.
+        For a VanLeerConvectionTerm, and for an equation that has been solved on another mesh.
 
     Warns
     -----
     TransportWarning
-        For a velocity that is no FaceVariable, for a flow through faces without a condition, for central differences
-        at an inlet, and for a diffusion coefficient that is a tensor.
+        For a velocity that is interpolated from cells or not free of divergence, for a flow through faces without a
+        condition, for central differences at an inlet, and for a diffusion coefficient that is a tensor.
     """
+    mesh = _meshes.get(equation)
+    if mesh is not None and mesh() is not variable.mesh:
+        raise InputError(
+            "this equation has been solved on another mesh, whose geometry FiPy keeps in its terms: make it anew"
+        )
+    _meshes[equation] = weakref.ref(variable.mesh)
+    told = _told.setdefault(equation, set())
     for term in _terms(equation):
+        of_term = term.var if term.var is not None else variable
         if isinstance(term, _AbstractConvectionTerm):
-            _check_convection(term, term.var if term.var is not None else variable)
+            found = _of_convection(term, of_term)
         elif isinstance(term, _AbstractDiffusionTerm):
-            _check_diffusion(term, term.var if term.var is not None else variable)
+            found = _of_diffusion(term, of_term)
+        else:
+            continue
+        for message in found:
+            if message not in told:
+                told.add(message)
+                warnings.warn(message, TransportWarning, stacklevel=_CALLER)
 
 
 def _terms(equation: Any) -> Iterator[Any]:
@@ -58,7 +78,7 @@ def _terms(equation: Any) -> Iterator[Any]:
         yield equation
 
 
-def _check_convection(term: Any, variable: Any) -> None:
+def _of_convection(term: Any, variable: Any) -> Iterator[str]:
     name = type(term).__name__
     if isinstance(term, fipy.VanLeerConvectionTerm):
         raise InputError(
@@ -67,43 +87,60 @@ def _check_convection(term: Any, variable: Any) -> None:
         )
     velocity = term.coeff
     if not isinstance(velocity, fipy.FaceVariable) or isinstance(velocity, _CellToFaceVariable):
-        warnings.warn(
+        yield (
             f"the velocity of a {name} is not given on faces: what is uniform, or interpolated from pores, is not "
-            "free of divergence where grains are in its way. Take flow.to_fipy().velocity",
-            TransportWarning, stacklevel=_CALLER,
-        )  # fmt: skip
+            "free of divergence where grains are in its way. Take flow.to_fipy().velocity"
+        )
         return
     mesh = variable.mesh
-    through = np.abs(mesh.flux(velocity))
+    flux = mesh.flux(velocity)
+    through = np.abs(flux)
+    # Twice what passes the pores, for all faces between two of them count with both.
+    gained = float(np.abs(np.asarray(velocity.divergence.value) * mesh.cellVolumes).sum())
+    if gained > _DIVERGENCE * through.sum():
+        yield (
+            f"pores gain or lose {100.0 * gained / through.sum():.0f} % of what the velocity of a {name} carries: a "
+            "uniform or interpolated velocity does not go round grains. Take flow.to_fipy().velocity, unless the fluid "
+            "is stored or injected"
+        )
     passed = mesh.exteriorFaces.value & (through > _NOTHING * through.max(initial=0.0))
     value, slope = _mask(variable.arithmeticFaceValue), _mask(variable.faceGrad)
-    open_ = passed & ~value & ~slope
-    if open_.any():
-        warnings.warn(
-            f"{variable.name or 'the variable'} has no condition on {counted(int(open_.sum()), 'face')} that fluid "
-            "passes: nothing is carried through them. Constrain its value where fluid enters, and its faceGrad, to "
-            "zero, where it leaves",
-            TransportWarning, stacklevel=_CALLER,
-        )  # fmt: skip
+    open_ = int((passed & ~value & ~slope).sum())
+    if open_:
+        yield (
+            f"{variable.name or 'the variable'} has no condition on {counted(open_, 'face')} that fluid passes: "
+            "nothing is carried through them. Constrain its value where fluid enters, and its faceGrad, to zero, where "
+            "it leaves"
+        )
+    loose = int((passed & (flux < 0.0) & ~value & slope).sum())
+    if loose:
+        yield (
+            f"{variable.name or 'the variable'} has no value on {counted(loose, 'face')} through which fluid enters: "
+            "it enters with the value of the pore. Constrain its value there"
+        )
     if isinstance(term, fipy.CentralDifferenceConvectionTerm) and (passed & value).any():
-        warnings.warn(
+        yield (
             "central differences at an inlet give values out of range: use UpwindConvectionTerm or "
-            "PowerLawConvectionTerm",
-            TransportWarning, stacklevel=_CALLER,
-        )  # fmt: skip
+            "PowerLawConvectionTerm"
+        )
 
 
-def _check_diffusion(term: Any, variable: Any) -> None:
+def _of_diffusion(term: Any, variable: Any) -> Iterator[str]:
     coefficient = getattr(term, "nthCoeff", None)
-    rank = (
-        coefficient.rank if isinstance(coefficient, fipy.FaceVariable) else np.ndim(getattr(coefficient, "value", 0.0))
-    )
+    if isinstance(coefficient, fipy.FaceVariable):
+        rank = coefficient.rank
+    else:
+        rank = np.ndim(getattr(coefficient, "value", 0.0))
     if variable.rank == 0 and rank > 0:
-        warnings.warn(
+        yield (
             "the coefficient of a DiffusionTerm is a vector or a tensor: what it carries along the faces of pores "
-            "means nothing. Give a number for each face, n·D·n",
-            TransportWarning, stacklevel=_CALLER,
-        )  # fmt: skip
+            "means nothing. Give a number for each face, n·D·n"
+        )
+    if term.order > 2 and (_mask(variable.arithmeticFaceValue).any() or _mask(variable.faceGrad).any()):
+        yield (
+            f"FiPy's constrain() does not reach a DiffusionTerm of order {term.order}: give its conditions as "
+            "boundaryConditions, with FixedValue and NthOrderBoundaryCondition"
+        )
 
 
 def _mask(field: Any) -> np.ndarray:

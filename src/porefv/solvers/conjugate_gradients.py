@@ -167,7 +167,7 @@ def conjugate_gradients(
         r = network.residual(rhs, x)
         lost = float(np.abs(r).sum())
         flow, floor = _measures(network, rhs, x)
-        if lost <= max(tolerance * flow, floor) or lost > 0.5 * before or iterations >= limit:
+        if lost <= max(tolerance * flow, floor) or not lost < 0.5 * before or iterations >= limit:
             return x, iterations
         before = lost
         rule = _ImbalanceRule(0.0, enough)

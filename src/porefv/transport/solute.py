@@ -122,8 +122,8 @@ class Solute:
         empty = np.flatnonzero(self.volumes <= 0.0)
         if len(empty):
             raise InputError(
-                f"{counted(len(empty), 'pore')}, the first of them {empty[0]}, would have no void volume: a solute needs "
-                "spheres that overlap less"
+                f"{counted(len(empty), 'pore')}, the first of them {empty[0]}, would have no void volume: a solute "
+                "needs spheres that overlap less"
             )
         faces = mesh.wall_faces
         beside = mesh.cell_pore[faces.cells]
@@ -133,8 +133,8 @@ class Solute:
             below = np.flatnonzero(surfaces < 0.0)
             if len(below):
                 raise InputError(
-                    f"{counted(len(below), 'pore')}, the first of them {below[0]}, would have a surface of grains below "
-                    "zero: a reaction at grains needs spheres that overlap less"
+                    f"{counted(len(below), 'pore')}, the first of them {below[0]}, would have a surface of grains "
+                    "below zero: a reaction at grains needs spheres that overlap less"
                 )
             self.losses = self.losses + grains * surfaces
         self.carried: BalancedFlow = balanced_flow(flow)
@@ -263,4 +263,3 @@ def _by_name(values: float | Mapping[str, float], names: tuple[str, ...], what: 
         if name not in names:
             raise InputError(f"{what} has no {name!r}: it may have {', '.join(names)}")
     return np.array([_numbers(values.get(name, 0.0), 1, f"{what} of {name}", "name")[0] for name in names])
-
