@@ -119,6 +119,7 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("conductance", flow["conductance"]),
         ("inflow", f"{flow['inflow']:.6g} m³/s"),
         ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("Reynolds number", _reynolds(summary.get("reynolds"))),
         ("outside tested range", _outside(summary.get("reliability"))),
         ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
@@ -155,6 +156,11 @@ def _axes_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return [*rows, ("walls beside the flow", "slip" if found["slip"] else "no-slip")]
 
 
+def _reynolds(found: Mapping[str, float] | None) -> str | None:
+    """The number of the Darcy velocity, and the largest of a pore's; None where no density was given."""
+    return None if found is None else f"{found['sample']:.3g}, in a pore at most {found['largest_pore']:.3g}"
+
+
 def _outside(found: Mapping[str, float] | None) -> str | None:
     """How much of the flow is where the model was not tested, if that is worth a word."""
     if found is None or found["outside"] < 0.01:
@@ -169,7 +175,9 @@ def _sample_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     rows: list[tuple[str, Any]] = []
     if "tortuosity" in summary:
         tortuosity = summary["tortuosity"]
-        rows.append(("tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}"))
+        rows.append(
+            ("hydraulic tortuosity", "unknown, as nothing flows" if tortuosity is None else f"{tortuosity:.6g}")
+        )
     if "velocity" in summary:
         rows += [
             ("Darcy velocity", f"({vector_text(summary['velocity']['darcy'])}) m/s"),

@@ -12,11 +12,18 @@ if TYPE_CHECKING:
     from porefv.export.openpnm_network import openpnm_network
     from porefv.export.pictures import flow_picture, picture
     from porefv.export.trajectories import Trajectory
-    from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, to_pyvista
+    from porefv.export.vtk_datasets import (
+        cells_grid,
+        paths_polydata,
+        spheres_polydata,
+        throats_polydata,
+        to_pyvista,
+        write_paths,
+    )
 
 __all__ = [
-    "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "picture", "spheres_polydata", "throats_polydata",
-    "to_meshio", "to_pyvista",
+    "Trajectory", "cells_grid", "flow_picture", "openpnm_network", "paths_polydata", "picture", "spheres_polydata",
+    "throats_polydata", "to_meshio", "to_pyvista", "write_paths",
 ]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
@@ -25,10 +32,12 @@ __getattr__, __dir__ = lazy_exports(
         "cells_grid": "porefv.export.vtk_datasets",
         "flow_picture": "porefv.export.pictures",
         "openpnm_network": "porefv.export.openpnm_network",
+        "paths_polydata": "porefv.export.vtk_datasets",
         "picture": "porefv.export.pictures",
         "spheres_polydata": "porefv.export.vtk_datasets",
         "throats_polydata": "porefv.export.vtk_datasets",
         "to_meshio": "porefv.export.meshio_mesh",
         "to_pyvista": "porefv.export.vtk_datasets",
+        "write_paths": "porefv.export.vtk_datasets",
     },
 )
