@@ -48,14 +48,14 @@ def test_a_density_that_is_given_counts_as_given_whatever_it_is():
 
 def test_above_one_results_are_written_with_a_warning_that_says_what_it_means(mesh_of, tmp_path):
     packing = mesh_of("n25_s1").packing
-    fast = small(packing, 1.0, Fluid(1e-3, 1000.0))
+    fast = small(packing, 100.0, Fluid(1e-3, 1000.0))
     assert fast.reynolds > 1.0
     with pytest.warns(OutOfRangeWarning, match=r"Reynolds number .* without inertia.*too large"):
         results.write(fast, tmp_path / "fast", vtk=False)
 
 
 def test_the_summary_and_info_have_it(mesh_of, tmp_path, capsys):
-    slow = small(mesh_of("n25_s1").packing, 1e-4, Fluid(1e-3, 1000.0))
+    slow = small(mesh_of("n25_s1").packing, 1.0, Fluid(1e-3, 1000.0))
     assert slow.reynolds < 1.0
     directory = results.write(slow, tmp_path / "slow", vtk=False)
     summary = json.loads((directory / "summary.json").read_text())

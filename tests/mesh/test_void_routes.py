@@ -19,7 +19,7 @@ def depth(packing, begin, end):
 
 @given(st.integers(0, 10_000))
 def test_lines_meet_the_spheres_that_a_search_through_all_finds(random_packing, seed):
-    packing = random_packing(60, ratio=0.05, seed=seed).packing
+    packing = random_packing(60, ratio=0.05, seed=seed)
     random = np.random.default_rng(seed)
     box = packing.box
     ends = box.lower + box.size * random.random((2, 200, 3))
@@ -33,15 +33,14 @@ def test_lines_meet_the_spheres_that_a_search_through_all_finds(random_packing, 
 def test_a_line_that_touches_a_sphere_does_not_cut_it():
     packing = Packing([[0.5, 0.5, 0.5]], [0.25], Box([0, 0, 0], [1, 1, 1]))
     begin = np.array([[0.0, 0.5, 0.75], [0.0, 0.5, 0.7499]])
-    end = begin + [1.0, 0.0, 0.0]
+    end = begin + np.array([1.0, 0.0, 0.0])
     assert SpheresOnLines(packing).cut(begin, end).tolist() == [False, True]
     assert SpheresOnLines(packing).cut(np.full((1, 3), np.nan), end[:1]).all()
 
 
 @given(st.integers(0, 10_000))
 def test_routes_say_truly_whether_they_cut(random_packing, seed):
-    found = random_packing(20, ratio=0.1, seed=seed)
-    mesh = found if isinstance(found, PoreMesh) else PoreMesh(found)
+    mesh = PoreMesh(random_packing(20, ratio=0.1, seed=seed))
     throats = np.flatnonzero(~mesh.throats.closed)
     for routes in (
         *routes_to_necks(mesh, throats, np.zeros(6, bool)),

@@ -9,6 +9,7 @@ import numpy as np
 
 from porefv.errors import ComputationError, InputError
 from porefv.mesh.void_routes import SpheresOnLines, routes_to_necks, routes_to_walls
+from porefv.packing.box import WALL_AXES
 
 if TYPE_CHECKING:
     import pyvista
@@ -39,7 +40,7 @@ class Paths:
     height : float or None
         Distance of the two pressure walls [m]; None if they are not one pair of opposite walls.
     cut : int
-        Straight pieces of the routes in use, each counted once, that pass through a grain.
+        Ways through pores, each counted once, on which no line that was tried passes outside all grains.
     """
 
     points: np.ndarray
@@ -123,6 +124,24 @@ class _Ways(NamedTuple):
     starts: np.ndarray
 
 
+class _Visits(NamedTuple):
+    """Visits of particles to pores, path by path.
+
+    Attributes
+    ----------
+    pores, ways, paths, places : (v,) int arrays
+        Pore, way out of it (`_Ways`), path, and how many visits of the path came before.
+    times : (v,) array
+        When the particle enters the pore [s].
+    """
+
+    pores: np.ndarray
+    ways: np.ndarray
+    paths: np.ndarray
+    places: np.ndarray
+    times: np.ndarray
+
+
 def paths(flow: PoreFlow, face_flux: np.ndarray, injected: np.ndarray | None, count: int, seed: int = 0) -> Paths:
     """Paths of particles, drawn by flux: as many enter by a face, and leave a pore by a throat, as fluid does.
 
@@ -150,7 +169,8 @@ def paths(flow: PoreFlow, face_flux: np.ndarray, injected: np.ndarray | None, co
     InputError
         For a count or a seed that is none, or if nothing flows.
     ComputationError
-        If a pore that particles reach has no outflow, as the pressures are far from balance.
+        If a pore that particles reach has no outflow, as the pressures are far from balance, or a void volume below
+        zero.
     """
     for value, name, least in ((count, "count", 1), (seed, "seed", 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
@@ -165,8 +185,8 @@ def paths(flow: PoreFlow, face_flux: np.ndarray, injected: np.ndarray | None, co
     entries = random.choice(len(entering), count, p=np.maximum(entering, 0.0) / np.maximum(entering, 0.0).sum())
     pores_of_entries = np.concatenate([pores_of_faces, np.arange(mesh.n_pores)])
     ways, through = _ways(mesh, flux, entering, pores_of_entries)
-    visited, taken, number, length = _walk(mesh, ways, pores_of_entries[entries], random)
-    return _assemble(flow, entries, visited, taken, number, length, through)
+    stays = np.divide(mesh.pore_volumes, through, out=np.zeros(mesh.n_pores), where=through > 0.0)
+    return _assemble(flow, entries, _walk(mesh, ways, pores_of_entries[entries], stays, random), stays)
 
 
 def _ways(
@@ -186,11 +206,10 @@ def _ways(
     return _Ways(keys, order, starts), through
 
 
-def _walk(
-    mesh: PoreMesh, ways: _Ways, first: np.ndarray, random: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pores that particles visit, ways by which they leave, their paths and places in the path: (v,) each."""
+def _walk(mesh: PoreMesh, ways: _Ways, first: np.ndarray, stays: np.ndarray, random: np.random.Generator) -> _Visits:
+    """The visits of particles to pores, path by path, from their first pores (n,) and the stays in pores (n_pores,)."""
     throats = mesh.throats
+    times = np.zeros(len(first))
     walked: list[tuple[np.ndarray, ...]] = []
     here, who, step = first, np.arange(len(first)), 0
     while len(who):
@@ -202,29 +221,25 @@ def _walk(
             raise ComputationError("a particle goes round in a circle: the flow does not go down the pressure")
         chosen = np.searchsorted(ways.keys, here + random.random(len(here)), side="right")
         way = ways.ways[np.clip(chosen, begin, end - 1)]
-        walked.append((here, way, who, np.full(len(who), step)))
+        walked.append((here, way, who, np.full(len(who), step), times[who]))
+        times[who] += stays[here]
         goes_on = way < len(throats)
         pairs = throats.pores[way[goes_on]]
         here = pairs.sum(axis=1) - here[goes_on]
         who = who[goes_on]
         step += 1
-    visited, taken, number, place = (np.concatenate(values) for values in zip(*walked, strict=True))
-    return visited, taken, number, place
+    columns = [np.concatenate(values) for values in zip(*walked, strict=True)]
+    order = np.lexsort((columns[3], columns[2]))
+    return _Visits(*(values[order] for values in columns))
 
 
-def _assemble(
-    flow: PoreFlow,
-    entries: np.ndarray,
-    visited: np.ndarray,
-    taken: np.ndarray,
-    number: np.ndarray,
-    place: np.ndarray,
-    through: np.ndarray,
-) -> Paths:
-    """The points of the paths, from pores (v,), ways out of them, paths and places in the path."""
+def _assemble(flow: PoreFlow, entries: np.ndarray, visits: _Visits, stays: np.ndarray) -> Paths:
+    """The points of the paths, from what each enters by (n,), the visits, and the stays in pores (n_pores,)."""
     mesh = flow.mesh
-    order = np.lexsort((place, number))
-    visited, taken, number, place = (values[order] for values in (visited, taken, number, place))
+    visited, taken, number, place, before = visits
+    if (stays[visited] < 0.0).any():
+        pore = int(visited[np.argmax(stays[visited] < 0.0)])
+        raise ComputationError(f"pore {pore} has a void volume below zero, as spheres overlap: no residence time")
     t = len(mesh.throats)
     came = np.empty(len(taken), int)
     came[1:] = taken[:-1]
@@ -233,9 +248,13 @@ def _assemble(
     outward, cut_out = _routes(flow, taken, visited)
     # A visit to a pore: from where it is entered, by the middle, to where it is left; three points there, two back.
     points = np.concatenate([inward[:, [0, 1, 2]], outward[:, [1, 0]]], axis=1)
+    _straight_from_walls(flow, came, points[:, 0], points[:, 4])
+    _straight_from_walls(flow, taken, points[:, 4], points[:, 0])
     # Fluid cuts corners: it goes straight from one to the other where that is free, without the way to the middle.
     _, first, back = np.unique(np.stack([came, taken], axis=1), axis=0, return_index=True, return_inverse=True)
-    straight = ~SpheresOnLines(mesh.packing).cut(points[first, 0], points[first, 4])[back.ravel()]
+    straight_once = ~SpheresOnLines(mesh.packing).cut(points[first, 0], points[first, 4])
+    cut = int(((cut_in | cut_out)[first] & ~straight_once).sum())
+    straight = straight_once[back.ravel()]
     points[straight, 1:4] = 0.5 * (points[straight, :1] + points[straight, 4:])
     middle = np.linalg.norm(flow.pore_velocity, axis=1)[visited]
     pressure = flow.pressure[visited]
@@ -249,9 +268,6 @@ def _assemble(
     from_middle = np.divide(arcs - half, total - half, out=np.zeros_like(arcs), where=total > half)
     into, out = np.clip(1.0 - to_middle, 0.0, 1.0), np.clip(from_middle, 0.0, 1.0)
     into[:, 0], out[:, -1] = 1.0, 1.0
-    stay = mesh.pore_volumes[visited] / through[visited]
-    before = np.cumsum(stay) - stay
-    before -= before[np.searchsorted(number, np.arange(len(entries)))][number]
     fraction = np.divide(
         arcs, total, out=np.broadcast_to(np.linspace(0.0, 1.0, 5), arcs.shape).copy(), where=total > 0.0
     )
@@ -261,25 +277,38 @@ def _assemble(
 
     # The first point of a visit but the first is the last of the visit before. Points that coincide are left out.
     keep = np.ones(points.shape[:2], bool)
-    keep[place > 0, 0] = False
-    keep[:, 1:] &= (np.diff(points, axis=1) != 0.0).any(axis=2)
-    keep[:, -1] = True
+    keep[:, :-1] = (np.diff(points, axis=1) != 0.0).any(axis=2)
+    keep[:, 0] = (place == 0) & (keep[:, 0] | (total[:, 0] == 0.0))
     axis = flow.walls.axis
     counts = np.bincount(number, keep.sum(axis=1), len(entries)).astype(int)
     return Paths(
         points=points[keep],
         offsets=np.concatenate([[0], np.cumsum(counts)]),
         pores=np.broadcast_to(visited[:, None], keep.shape)[keep],
-        times=(before[:, None] + fraction * stay[:, None])[keep],
+        times=(before[:, None] + fraction * stays[visited][:, None])[keep],
         pressures=between(pressure_in, pressure, pressure_out)[keep],
         speeds=between(speed_in, middle, speed_out)[keep],
         height=None if axis is None or flow.sources or flow.fixed_pressures else float(mesh.box.size[axis]),
-        cut=len(np.unique(np.concatenate([cut_in, cut_out]), axis=0)),
+        cut=cut,
     )
 
 
+def _straight_from_walls(flow: PoreFlow, ways: np.ndarray, begin: np.ndarray, end: np.ndarray) -> None:
+    """Move points (v, 3) on walls, begin, to those nearest to the other ends (v, 3) if nothing is between.
+
+    Pressure walls are passed anywhere: what comes from one goes straight to a neck.
+    """
+    faces = flow.mesh.wall_faces
+    rows = np.flatnonzero((ways >= len(flow.mesh.throats)) & (ways < len(flow.mesh.throats) + len(faces.cells)))
+    walls = faces.walls[ways[rows] - len(flow.mesh.throats)]
+    nearest = end[rows].copy()
+    nearest[np.arange(len(rows)), WALL_AXES[walls]] = flow.mesh.box.wall_places[walls]
+    free = ~SpheresOnLines(flow.mesh.packing).cut(nearest, end[rows])
+    begin[rows[free]] = nearest[free]
+
+
 def _routes(flow: PoreFlow, ways: np.ndarray, visited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Routes (v, 3, 3) from the ways (v,) to the middles of pores (v,), and those that cut: way and pore (c, 2)."""
+    """Routes (v, 3, 3) from the ways (v,) to the middles of pores (v,), and (v,) bool whether they cut a sphere."""
     mesh = flow.mesh
     t, w = len(mesh.throats), len(mesh.wall_faces.cells)
     points = np.repeat(mesh.inscribed_spheres.centres[visited][:, None], 3, axis=1)  # of what begins or ends inside
@@ -296,7 +325,7 @@ def _routes(flow: PoreFlow, ways: np.ndarray, visited: np.ndarray) -> tuple[np.n
         faces, back = np.unique(ways[at_wall] - t, return_inverse=True)
         found = routes_to_walls(mesh, faces)
         points[at_wall], cut[at_wall] = found.points[back], found.cut[back]
-    return points, np.stack([ways[cut], visited[cut]], axis=1)
+    return points, cut
 
 
 def _at_ends(

@@ -87,8 +87,8 @@ def routes_to_necks(mesh: PoreMesh, throats: np.ndarray, slip: np.ndarray) -> tu
     """Routes from the neck of each throat to the middles of its first and of its second pore.
 
     The neck is the centre of the throat's inscribed circle; the middle of a pore that of its inscribed sphere. Between
-    them leads a straight line or, where it cuts a sphere, one by the Laguerre vertex. Where both do, the neck is the
-    point of the Laguerre edge that is nearest to the plane of the facet.
+    them leads a straight line or, where it cuts a sphere, one by the Laguerre vertex. Where both do, or the circle's
+    centre is outside the box, the neck is the point of the Laguerre edge that is nearest to the plane of the facet.
 
     Parameters
     ----------
@@ -107,6 +107,7 @@ def routes_to_necks(mesh: PoreMesh, throats: np.ndarray, slip: np.ndarray) -> tu
     vertices = mesh.vertices[mesh.facets.cells[facets]]
     middles = mesh.inscribed_spheres.centres[mesh.throats.pores[throats]]
     necks = mesh.throats.inscribed_centres(slip)[throats]
+    necks[(mesh.box.wall_distances(necks) < 0.0).any(axis=1)] = np.nan
     sides = [_around(spheres, necks, vertices[:, side], middles[:, side]) for side in (0, 1)]
     bad = np.flatnonzero(sides[0].cut | sides[1].cut)
     if len(bad):
