@@ -132,7 +132,7 @@ def test_paths_through_the_channels_of_a_lattice_are_straight(mesh_of, unit_flow
     assert_allclose(paths.tortuosities, 1.0, rtol=1e-6)
 
 
-def test_a_throat_that_three_large_spheres_nearly_close_has_its_path_in_its_neck():
+def test_paths_lead_round_a_single_sphere():
     packing = Packing([[1.0, 1.0, 1.0]], [0.5], Box([0, 0, 0], [2, 2, 2]))
     flow = PoreFlow(PoreMesh(packing), Walls.along("x"))
     paths = flow.paths(50, seed=12)
