@@ -48,7 +48,7 @@ def main() -> None:
             loop = np.vstack([corners, corners[:1]]) * unit.factor
             axes.plot(*loop.T, color=INK, lw=0.35, zorder=3)
         inside = np.isin(throats.pores, pores).all(axis=1) & (flow.flux != 0.0)
-        points = middle.project(mesh.pore_points) * unit.factor
+        points = middle.project(mesh.pore_centres) * unit.factor
         widest = np.abs(flow.flux[inside]).max()
         for (i, j), flux in zip(throats.pores[inside], np.abs(flow.flux[inside]), strict=True):
             axes.plot(*points[[i, j]].T, color=FLOW, lw=9.0 * flux / widest, zorder=4, solid_capstyle="round")

@@ -124,7 +124,7 @@ def test_volumes_and_places_are_those_of_the_pores(mesh_of):
     mesh = mesh_of("n200_s1")
     network = mesh.to_openpnm()
     assert_array_equal(network["pore.volume"], mesh.pore_volumes)
-    assert_array_equal(network["pore.coords"], mesh.pore_points)
+    assert_array_equal(network["pore.coords"], mesh.pore_centres)
     assert network["pore.all"].all() and network["throat.all"].all()
     assert not any("conductance" in key or "pressure" in key for key in network)
 

@@ -20,7 +20,7 @@ def test_the_file_has_scalars_and_vectors_of_each_pore(without, mesh_of, tmp_pat
     viewer.PoreViewer(vars=[height, centre]).plot(tmp_path / "found.vtu")
     grid = pyvista.read(tmp_path / "found.vtu")
     expected = np.full((mesh.n_pores, 3), np.nan)
-    expected[fluid.pores] = mesh.pore_points[fluid.pores]
+    expected[fluid.pores] = mesh.pore_centres[fluid.pores]
     assert_array_equal(grid.cell_data["height"], expected[mesh.cell_pore, 2])
     assert_array_equal(grid.cell_data["variable 1"], expected[mesh.cell_pore])
 

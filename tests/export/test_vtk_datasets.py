@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError
-from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
+from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, write_paths
 from porefv.export.vtk_files import write_xml
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
@@ -153,3 +153,37 @@ def test_arrays_of_another_number_of_rows_are_refused():
         spheres_polydata(mesh.packing, force=np.zeros((3, 3)))
     with pytest.raises(InputError, match=rf"flux must have {len(mesh.throats)} rows, not shape \(1,\)"):
         throats_polydata(mesh.throats, flux=np.zeros(1))
+
+
+# ---- paths of particles ----------
+
+
+def test_paths_are_written_with_times_pressures_and_speeds(tmp_path):
+    flow = PoreFlow(Packing.read(PACKINGS / "n25_s1.csv"), Walls.along("y"))
+    paths = flow.paths(20, seed=1)
+    path = tmp_path / "paths.vtp"
+    for _ in range(2):  # a file that exists is replaced
+        write_paths(paths, path)
+    found = pyvista.read(path)
+    assert found.n_lines == 20
+    np.testing.assert_array_equal(found.points, paths.points)
+    for name, values in (
+        ("time", paths.times), ("pressure", paths.pressures), ("speed", paths.speeds), ("pore", paths.pores),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(found.point_data[name], values)
+    np.testing.assert_array_equal(found.cell_data["residence_time"], paths.residence_times)
+    np.testing.assert_allclose(found.compute_cell_sizes()["Length"], paths.lengths)
+    assert paths.to_pyvista().n_points == len(paths.points)
+
+
+def test_paths_need_a_name_of_their_format(tmp_path):
+    flow = PoreFlow(Packing.read(PACKINGS / "n25_s1.csv"), Walls.along("y"))
+    with pytest.raises(InputError, match=r"\.vtp"):
+        write_paths(flow.paths(2), tmp_path / "paths.vtu")
+
+
+def test_a_flow_has_its_fields_on_the_cells():
+    flow = PoreFlow(Packing.read(PACKINGS / "n25_s1.csv"), Walls.along("y"))
+    grid = flow.to_pyvista()
+    np.testing.assert_array_equal(grid["pressure"], flow.cell_pressure)
+    np.testing.assert_array_equal(grid["velocity"], flow.pore_velocity[flow.mesh.cell_pore])

@@ -53,7 +53,7 @@ def test_cells_are_the_voids_of_the_pores(mesh_of):
     fluid = mesh.to_fipy()
     assert_array_equal(fluid.pores, np.arange(mesh.n_pores))
     assert_array_equal(fluid.cellVolumes, mesh.pore_volumes)
-    assert_array_equal(np.asarray(fluid.cellCenters).T, mesh.pore_points)
+    assert_array_equal(np.asarray(fluid.cellCenters).T, mesh.pore_centres)
     assert fluid.pores_without_void == fluid.closed_throats == 0
 
 
@@ -96,7 +96,7 @@ def test_without_leaves_out_the_pores_of_walls(mesh_of):
     assert towards.sum() == (on_wall[mesh.throats.pores].sum(axis=1) == 1).sum()
     assert_allclose(fluid.scaledCellDistances[towards], mesh.throats.lengths[fluid.throats[towards]], rtol=1e-12)
     inside, outside = (on_wall[pairs] == kept for kept in (False, True))
-    way = mesh.pore_points[pairs[outside]] - mesh.pore_points[pairs[inside]]
+    way = mesh.pore_centres[pairs[outside]] - mesh.pore_centres[pairs[inside]]
     assert (np.einsum("ij,ji->i", way, np.asarray(fluid.faceNormals)[:, towards]) > 0.0).all()
 
 

@@ -80,13 +80,13 @@ def test_a_point_in_a_grain_stands_for_the_pore_of_the_nearest_laguerre_vertex(m
     mesh = mesh_of("n25_s1")
     centre = mesh.packing.centres[3]
     (pore,) = pores_in(mesh, Point(centre))
-    distances = np.linalg.norm(mesh.pore_points - centre, axis=1)
+    distances = np.linalg.norm(mesh.pore_centres - centre, axis=1)
     assert distances[pore] == distances.min()
 
 
 def test_a_box_and_a_sphere_stand_for_the_pores_whose_laguerre_vertices_they_contain(mesh_of):
     mesh = mesh_of("n200_s1")
-    vertices = mesh.pore_points
+    vertices = mesh.pore_centres
     in_box = pores_in(mesh, MIDDLE)
     assert_array_equal(in_box, np.flatnonzero((np.abs(vertices - 0.5) <= 0.2).all(axis=1)))
     in_sphere = pores_in(mesh, Sphere([0.5, 0.5, 0.5], 0.2))

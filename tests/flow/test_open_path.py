@@ -89,7 +89,7 @@ def test_a_plug_of_one_layer_closes_a_packing():
     flow = PoreFlow(mesh, Walls.along("y"))
     with pytest.warns(NoOpenPathWarning):
         pressure = flow.pressure
-    heights = mesh.pore_points[:, 1]
+    heights = mesh.pore_centres[:, 1]
     assert (pressure[heights < 0.35] == 1.0).all() and (pressure[heights > 0.65] == 0.0).all()
     with warnings.catch_warnings():
         warnings.simplefilter("error")

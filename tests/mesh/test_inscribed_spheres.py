@@ -34,7 +34,7 @@ HOLES = {
 @pytest.mark.parametrize("kind", HOLES)
 def test_the_holes_of_a_lattice_have_their_known_sizes(lattice, kind):
     mesh = PoreMesh(lattice(kind, 3))
-    inner = mesh.box.wall_distances(mesh.pore_points).min(axis=1) > 0.99
+    inner = mesh.box.wall_distances(mesh.pore_centres).min(axis=1) > 0.99
     found = mesh.inscribed_spheres.radii[inner] / mesh.packing.radii[0]
     assert_allclose(np.unique(found.round(9)), np.sort(HOLES[kind]), rtol=0, atol=1e-8)
 

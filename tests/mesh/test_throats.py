@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from porefv.conductance.effective_radius import EffectiveRadius
 from porefv.conductance.hydraulic_radius import HydraulicRadius
+from porefv.errors import InputError
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
@@ -312,3 +313,51 @@ def test_a_mesh_can_be_pickled_whatever_has_been_derived_from_it(mesh_of):
     assert mesh.throats.derived(lambda throats: len(throats)) == len(mesh.throats)
     again = pickle.loads(pickle.dumps(mesh))
     np.testing.assert_array_equal(again.throats.areas, mesh.throats.areas)
+
+
+# ---- single throats by their spheres ----------
+
+
+@pytest.mark.parametrize("name", ["n25_s1", "n54_s1", "sc8"])
+def test_a_throat_is_found_between_its_spheres_in_any_order(mesh_of, name):
+    throats = mesh_of(name).throats
+    for t in range(0, len(throats), 7):
+        i, j, k = throats.spheres[t].tolist()
+        assert throats.between(i, j, k) == throats.between(k, i, j) == throats.between(j, i, k) == t
+
+
+def test_between_spheres_without_a_facet_there_is_no_throat(mesh_of):
+    mesh = mesh_of("n25_s1")
+    for vertices in ((0, 0, 1), (0, 1, 1000), (mesh.n_spheres, mesh.n_spheres + 1, 0)):
+        with pytest.raises(InputError, match="no facet of the vertices"):
+            mesh.throats.between(*vertices)
+
+
+def test_a_facet_inside_a_united_pore_is_no_throat(mesh_of):
+    mesh = mesh_of("sc8")
+    inside = np.flatnonzero(mesh.throats.facet_throat < 0)
+    with pytest.raises(InputError, match="united pore"):
+        mesh.throats.between(*mesh.facets.vertices[inside[0]])
+
+
+def test_the_hydraulic_radius_is_the_volume_over_the_surface(mesh_of):
+    throats = mesh_of("n54_s1").throats
+    surfaces = throats.wetted_surfaces(NO_SLIP)
+    assert (surfaces > 0.0).all()
+    assert_allclose(throats.hydraulic_radii(NO_SLIP), throats.volumes / surfaces)
+
+
+@pytest.mark.parametrize("name", ["n54_s1", "n200_s1"])
+def test_circles_touch_the_spheres_and_walls_of_their_throats(mesh_of, name):
+    mesh = mesh_of(name)
+    throats, n = mesh.throats, mesh.n_spheres
+    single = np.diff(throats.facets_of_throats.starts) == 1
+    radii = throats.inscribed_radii(NO_SLIP)
+    centres = throats.inscribed_centres(NO_SLIP)
+    for column in throats.spheres.T:
+        rows = np.flatnonzero(single & (radii > 0.0) & (column < n))
+        gaps = np.linalg.norm(centres[rows] - mesh.packing.centres[column[rows]], axis=1)
+        assert_allclose(gaps - mesh.packing.radii[column[rows]], radii[rows], rtol=1e-7, atol=1e-12)
+        rows = np.flatnonzero(single & (radii > 0.0) & (column >= n))
+        gaps = mesh.box.wall_distances(centres[rows])[np.arange(len(rows)), column[rows] - n]
+        assert_allclose(gaps, radii[rows], rtol=1e-7, atol=1e-12)

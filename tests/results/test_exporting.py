@@ -50,7 +50,7 @@ def test_csv_files_have_a_row_for_each_pore_and_each_throat(flow, found, tmp_pat
     np.testing.assert_array_equal(table["pressure"], flow.pressure)
     np.testing.assert_array_equal(table["velocity_y"], flow.pore_velocity[:, 1])
     np.testing.assert_array_equal(table["x_min"], flow.mesh.pore_walls & 1)
-    np.testing.assert_array_equal(np.stack([table[x] for x in "xyz"], axis=1), flow.mesh.pore_points)
+    np.testing.assert_array_equal(np.stack([table[x] for x in "xyz"], axis=1), flow.mesh.pore_centres)
     table = np.genfromtxt(throats, delimiter=",", names=True)
     np.testing.assert_array_equal(table["flux"], flow.flux)
     np.testing.assert_array_equal(table["conductance"], flow.conductances)

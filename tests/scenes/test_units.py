@@ -236,3 +236,9 @@ def test_pint_is_imported_only_for_a_scene_with_a_unit():
         "FlowScene.from_mapping(data | {'fluid': {'viscosity': '1 cP'}})\nassert 'pint' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(("fluid", "given"), [({}, False), ({"viscosity": 0.1}, False), ({"density": 1000.0}, True)])
+def test_a_scene_knows_whether_its_density_was_given(fluid, given):
+    scene = flow_scene(fluid=fluid)
+    assert scene.fluid.density == 1000.0 and scene.fluid.density_given == given

@@ -39,7 +39,7 @@ def test_without_grains_diffusion_is_that_of_the_fluid(random_packing):
     for axis in "xyz":
         found = effective_diffusion(points, axis)
         assert_allclose(found.relative_diffusivity, 1.0, rtol=1e-5)
-        x = points.pore_points[:, "xyz".index(axis)]
+        x = points.pore_centres[:, "xyz".index(axis)]
         assert_allclose(found.concentration, 1.0 - x, atol=1e-5)
 
 

@@ -123,6 +123,7 @@ def _flow_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
         ("conductance", flow["conductance"]),
         ("inflow", f"{flow['inflow']:.6g} m³/s"),
         ("outflow", f"{flow['outflow']:.6g} m³/s (imbalance {flow['imbalance']:.1e})"),
+        ("Reynolds number", _reynolds(summary.get("reynolds"))),
         ("outside tested range", _outside(summary.get("reliability"))),
         ("closing error", _bound(flow.get("closing_error"), "of the flow, in throats closed that may be open")),
     ]
@@ -157,6 +158,11 @@ def _axes_rows(summary: Mapping[str, Any]) -> list[tuple[str, Any]]:
     found = summary["permeabilities"]
     rows = [(axis, f"{found[axis]:.6g} m²") for axis in "xyz"]
     return [*rows, ("walls beside the flow", "slip" if found["slip"] else "no-slip")]
+
+
+def _reynolds(found: Mapping[str, float] | None) -> str | None:
+    """The number of the Darcy velocity, and the largest of a pore's; None where no density was given."""
+    return None if found is None else f"{found['sample']:.3g}, in a pore at most {found['largest_pore']:.3g}"
 
 
 def _outside(found: Mapping[str, Any] | None) -> str | None:

@@ -13,11 +13,18 @@ if TYPE_CHECKING:
     from porefv.export.pictures import picture
     from porefv.export.pore_viewer import PoreViewer
     from porefv.export.trajectories import Trajectory
-    from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, to_pyvista
+    from porefv.export.vtk_datasets import (
+        cells_grid,
+        paths_polydata,
+        spheres_polydata,
+        throats_polydata,
+        to_pyvista,
+        write_paths,
+    )
 
 __all__ = [
-    "PoreViewer", "Trajectory", "cells_grid", "openpnm_network", "picture", "spheres_polydata", "throats_polydata",
-    "to_meshio", "to_pyvista",
+    "PoreViewer", "Trajectory", "cells_grid", "openpnm_network", "paths_polydata", "picture", "spheres_polydata",
+    "throats_polydata", "to_meshio", "to_pyvista", "write_paths",
 ]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
@@ -26,10 +33,12 @@ __getattr__, __dir__ = lazy_exports(
         "Trajectory": "porefv.export.trajectories",
         "cells_grid": "porefv.export.vtk_datasets",
         "openpnm_network": "porefv.export.openpnm_network",
+        "paths_polydata": "porefv.export.vtk_datasets",
         "picture": "porefv.export.pictures",
         "spheres_polydata": "porefv.export.vtk_datasets",
         "throats_polydata": "porefv.export.vtk_datasets",
         "to_meshio": "porefv.export.meshio_mesh",
         "to_pyvista": "porefv.export.vtk_datasets",
+        "write_paths": "porefv.export.vtk_datasets",
     },
 )

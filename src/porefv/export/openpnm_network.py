@@ -17,7 +17,7 @@ def mesh_to_openpnm(mesh: PoreMesh) -> dict[str, np.ndarray]:
     """The pores and throats of a mesh: the part of `openpnm_network` that needs no flow."""
     throats = mesh.throats
     return openpnm_network(
-        mesh.pore_points,
+        mesh.pore_centres,
         throats.pores,
         pore_data={"volume": mesh.pore_volumes, "walls": mesh.pore_walls},
         throat_data={"length": throats.lengths, "area": throats.areas, "fluid_area": throats.fluid_areas},
@@ -28,7 +28,7 @@ def flow_to_openpnm(flow: PoreFlow) -> dict[str, np.ndarray]:
     """The pores and throats of a flow, with conductances, fluxes, pressures, and the imposed pressures."""
     mesh, throats = flow.mesh, flow.mesh.throats
     return openpnm_network(
-        mesh.pore_points,
+        mesh.pore_centres,
         throats.pores,
         pore_data={"volume": mesh.pore_volumes, "walls": mesh.pore_walls, "pressure": flow.pressure},
         throat_data={

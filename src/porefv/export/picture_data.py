@@ -154,7 +154,7 @@ def cells_of_mesh(mesh: CellMesh) -> Cells:
 
 def _network_of_mesh(mesh: PoreMesh) -> Network:
     areas = np.where(mesh.throats.closed, 0.0, mesh.throats.fluid_areas)
-    return Network(mesh.pore_points, mesh.throats.pores, areas)
+    return Network(mesh.pore_centres, mesh.throats.pores, areas)
 
 
 def _needs_a_flow(name: str) -> str:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv.errors import InputError
 from porefv.export.cell_data import values_by_cell
-from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points
+from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points, write_xml
 from porefv.mesh.cell_mesh import CellMesh
 from porefv.mesh.polyhedra import polyhedra
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.mesh.throats import Throats
 from porefv.packing.packing import Packing
+from porefv.system.atomic_files import atomic_write, locked
 from porefv.system.optional_imports import load
 
 if TYPE_CHECKING:
     import pyvista
     from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
+
+    from porefv.flow.paths import Paths
 
 
 def to_pyvista(mesh: CellMesh, **cell_data: Any) -> pyvista.UnstructuredGrid:
@@ -77,7 +83,44 @@ def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
     Points are Laguerre vertices, that of a united pore the mean of several.
     """
     polydata = vtk_data_model().vtkPolyData()
-    polydata.SetPoints(vtk_points(throats.mesh.pore_points))
+    polydata.SetPoints(vtk_points(throats.mesh.pore_centres))
     polydata.SetLines(cell_array(throats.pores))
     attach(polydata.GetCellData(), cell_data, len(throats))
     return polydata
+
+
+def paths_polydata(paths: Paths) -> vtkPolyData:
+    """A line for each path, with the point data `time` [s], `pressure` [Pa], `speed` [m/s] and `pore` (id).
+
+    Cell data `residence_time` [s] and `length` [m] have a row for each path.
+    """
+    vtk = vtk_data_model()
+    polydata = vtk.vtkPolyData()
+    polydata.SetPoints(vtk_points(paths.points))
+    lines = vtk.vtkCellArray()
+    m = len(paths.points)
+    lines.SetData(vtk_array(paths.offsets.astype(np.int64)), vtk_array(np.arange(m, dtype=np.int64)))
+    polydata.SetLines(lines)
+    of_points = {"time": paths.times, "pressure": paths.pressures, "speed": paths.speeds, "pore": paths.pores}
+    attach(polydata.GetPointData(), of_points, m)
+    of_paths = {"residence_time": paths.residence_times, "length": paths.lengths}
+    attach(polydata.GetCellData(), of_paths, len(paths))
+    return polydata
+
+
+def write_paths(paths: Paths, path: str | PathLike[str]) -> None:
+    """Write paths to a .vtp file, the dataset of `paths_polydata`; a file that exists is replaced.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in .vtp, or the file cannot be written.
+    MissingExtraError
+        If VTK is not installed.
+    """
+    path = Path(path)
+    if path.suffix != ".vtp":
+        raise InputError(f"cannot write {path}: files of paths need a name that ends in .vtp")
+    dataset = paths_polydata(paths)
+    with locked(path), atomic_write(path) as temporary:
+        write_xml(dataset, temporary)

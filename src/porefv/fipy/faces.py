@@ -95,10 +95,10 @@ def _faces_of_throats(mesh: PoreMesh, cell_of_pore: np.ndarray, left_out: list[i
     pores[turned] = pores[turned, ::-1]
     normals[turned] *= -1.0
     ratios[turned] = 1.0 - ratios[turned]
-    centres = mesh.pore_points[pores[:, 0]] + (ratios * lengths)[:, None] * normals
+    centres = mesh.pore_centres[pores[:, 0]] + (ratios * lengths)[:, None] * normals
     outer = np.flatnonzero(cells[:, 1] < 0)
     ratios[outer] = 1.0
-    centres[outer] = mesh.pore_points[pores[outer, 0]] + lengths[outer, None] * normals[outer]
+    centres[outer] = mesh.pore_centres[pores[outer, 0]] + lengths[outer, None] * normals[outer]
     walls = np.full(len(found), -1)
     for wall in reversed(left_out):
         on_wall = outer[(mesh.pore_walls[pores[outer, 1]] >> wall & 1).astype(bool)]
@@ -129,7 +129,7 @@ def _faces_on_walls(mesh: PoreMesh, cell_of_pore: np.ndarray) -> tuple[np.ndarra
     kept = np.flatnonzero(cell_of_pore[pores] >= 0)
     pores, walls, areas = pores[kept], walls[kept], areas[kept]
     distances = np.full(len(kept), WALL_DISTANCE * float(mesh.packing.radii.mean()))
-    centres = mesh.pore_points[pores].copy()
+    centres = mesh.pore_centres[pores].copy()
     axes = WALL_AXES[walls]
     centres[np.arange(len(kept)), axes] = mesh.box.wall_places[walls]
     cells = np.stack([cell_of_pore[pores], np.full(len(kept), -1)], axis=1)

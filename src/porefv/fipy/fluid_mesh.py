@@ -183,7 +183,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
         return np.append(self._given.centres, [self._given.centres[0]], axis=0).T
 
     def _calcCellCenters(self) -> np.ndarray:
-        return self.pore_mesh.pore_points[self.pores].T.copy()
+        return self.pore_mesh.pore_centres[self.pores].T.copy()
 
     def _calcCellVolumes(self) -> np.ndarray:
         return self._void
@@ -353,7 +353,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     def _least_squares(self, outer: bytes) -> LeastSquaresGradient:
         """The gradient with these faces (f,) bool, as bytes, for neighbours besides the cells."""
         if outer not in self._gradients:
-            given, centres = self._given, self.pore_mesh.pore_points[self.pores]
+            given, centres = self._given, self.pore_mesh.pore_centres[self.pores]
             both = given.cells[:, 1] >= 0
             faces = np.flatnonzero(both | np.frombuffer(outer, bool))
             first, second = given.cells[faces].T

@@ -172,6 +172,6 @@ def refuse_sources_without_outlet(mesh: PoreMesh, sources: np.ndarray, connected
     if len(wrong):
         pore = int(wrong[0])
         raise ComputationError(
-            f"pore {pore} at {vector(mesh.pore_points[pore])} m has a source of {sources[pore]:.6g} m³/s, and no "
+            f"pore {pore} at {vector(mesh.pore_centres[pore])} m has a source of {sources[pore]:.6g} m³/s, and no "
             "open path leads from it to an imposed pressure"
         )

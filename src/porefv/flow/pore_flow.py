@@ -26,6 +26,7 @@ from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
 from porefv.flow.inside import FixedPressure, FlowSource, ImposedInside, check_imposed, imposed_inside
 from porefv.flow.interior import Interior, interior
 from porefv.flow.open_path import has_open_path, no_open_path_text
+from porefv.flow.paths import Paths, paths
 from porefv.flow.pressure import (
     PressureField,
     held_pressures,
@@ -37,6 +38,7 @@ from porefv.flow.pressure_on_grains import acting_pressure
 from porefv.flow.profile import Profile, axis_number, plane_fluxes, profile
 from porefv.flow.regions import region_text
 from porefv.flow.reliability import Reliability, reliability
+from porefv.flow.reynolds import reynolds_number
 from porefv.flow.sizes import ConstrictionSizes, PoreSizes, constriction_sizes, pore_sizes
 from porefv.flow.tortuosity import hydraulic_tortuosity
 from porefv.flow.velocity import darcy_velocity, pore_velocities
@@ -51,6 +53,8 @@ from porefv.system.number_checks import MOST, ensure_finite, three_numbers
 from porefv.system.timer import Timer
 
 if TYPE_CHECKING:
+    import pyvista
+
     from porefv.export.picture_output import Picture
     from porefv.fipy.flow_problem import FlowProblem
 
@@ -401,15 +405,18 @@ class PoreFlow(FixedInputs):
         return self.permeability * self.fluid.density * STANDARD_GRAVITY / self.fluid.viscosity
 
     @lazy_property
+    def _injected(self) -> np.ndarray | None:
+        """(n_pores,): volume that enters each pore per unit time other than through a wall; None without regions."""
+        if self._inside is None:
+            return None
+        through_walls = np.bincount(self.mesh.cell_pore[self.mesh.wall_faces.cells], self.face_flux, self.mesh.n_pores)
+        driven = (self.flow_of_sources != 0.0) | ~np.isnan(self._inside.pressures)
+        return np.where(driven, net_outflows(self.mesh, self.flux) - through_walls, 0.0)
+
+    @lazy_property
     def pore_velocity(self) -> np.ndarray:
         """(n_pores, 3): mean velocity of the fluid in each pore [m/s]."""
-        injected = None
-        if self._inside is not None:  # all that does not come through a wall
-            through_walls = np.bincount(
-                self.mesh.cell_pore[self.mesh.wall_faces.cells], self.face_flux, self.mesh.n_pores
-            )
-            injected = net_outflows(self.mesh, self.flux) - through_walls
-        velocities = pore_velocities(self.mesh, self.flux, self.face_flux, injected)
+        velocities = pore_velocities(self.mesh, self.flux, self.face_flux, self._injected)
         return ensure_finite(velocities, "velocities")
 
     @property
@@ -467,9 +474,28 @@ class PoreFlow(FixedInputs):
         return darcy_velocity(self.mesh, self.face_flux)
 
     @property
+    def porosity(self) -> float:
+        """Porosity of the packing in its box (`Packing.porosity`)."""
+        return self.mesh.packing.porosity
+
+    @property
+    def reynolds(self) -> float | None:
+        """Re = ρ U d / μ, with U the size of the Darcy velocity and d the mean diameter; None without a given density.
+
+        The flow is computed without inertia, as if Re were zero.
+        """
+        return reynolds_number(self.fluid, self.mesh.packing, float(np.linalg.norm(self.darcy_velocity)))
+
+    @property
+    def pore_reynolds(self) -> float | None:
+        """The largest ρ u d / μ of a pore, with u the size of its mean velocity; None without a given density."""
+        speeds = np.linalg.norm(self.pore_velocity, axis=1)
+        return reynolds_number(self.fluid, self.mesh.packing, float(speeds.max()))
+
+    @property
     def interstitial_velocity(self) -> np.ndarray:
         """(3,): mean velocity of the fluid, the Darcy velocity over the porosity [m/s]."""
-        return self.darcy_velocity / self.mesh.packing.porosity
+        return self.darcy_velocity / self.porosity
 
     @lazy_property
     def tortuosity(self) -> float:
@@ -495,6 +521,18 @@ class PoreFlow(FixedInputs):
     def constriction_sizes(self) -> ConstrictionSizes:
         """Largest inscribed circle of each throat, and the size of its flux."""
         return constriction_sizes(self.mesh, self.flux, self.walls.slip)
+
+    def paths(self, count: int, seed: int = 0) -> Paths:
+        """Paths of particles through the network, drawn by flux, with residence times (`flow.paths.paths`).
+
+        Examples
+        --------
+        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+        >>> found = flow.paths(1000, seed=1)
+        >>> print(f"path tortuosity {found.path_tortuosity:.2f} ± {found.path_tortuosity_scatter:.2f}")
+        path tortuosity 1.28 ± 0.17
+        """
+        return paths(self, self.face_flux, self._injected, count, seed)
 
     def profile(self, layers: int = 10, axis: str | None = None) -> Profile:
         """Porosity and mean pressure of equally thick layers along "x", "y" or "z", the axis of flow by default."""
@@ -544,6 +582,11 @@ class PoreFlow(FixedInputs):
         from porefv.fipy.flow_problem import FlowProblem
 
         return FlowProblem(self, without)
+
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
+        """The cells as a `pyvista.UnstructuredGrid` with the pores' `volume`, `pressure` and `velocity`."""
+        mesh = self.mesh
+        return mesh.to_pyvista(volume=mesh.pore_volumes, pressure=self.pressure, velocity=self.pore_velocity)
 
     def to_openpnm(self) -> dict[str, np.ndarray]:
         """The network with its conductances in the names of OpenPNM (see `porefv.export.openpnm_network`)."""

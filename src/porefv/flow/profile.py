@@ -128,7 +128,7 @@ def plane_fluxes(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray, axis: 
     if places.ndim != 1 or not ((places > lower) & (places < upper)).all():
         raise InputError(f"planes must be places between {lower:.6g} and {upper:.6g} m, not {places.tolist()}")
     faces = mesh.wall_faces
-    of_pores = mesh.pore_points[:, axis]
+    of_pores = mesh.pore_centres[:, axis]
     of_faces = faces.centroids[:, axis] + mesh.triangulation.origin[axis]
     of_faces = np.where(WALL_AXES[faces.walls] == axis, mesh.box.wall_places[faces.walls], of_faces)
     begin = np.concatenate([of_pores[mesh.throats.pores[:, 0]], of_faces])

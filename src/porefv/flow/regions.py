@@ -95,7 +95,7 @@ def pores_in(mesh: PoreMesh, region: Region) -> np.ndarray:
     """
     if isinstance(region, Point):
         return np.array([pore_at(mesh, np.array(region.position))])
-    vertices = mesh.pore_points
+    vertices = mesh.pore_centres
     if isinstance(region, Sphere):
         inside = np.linalg.norm(vertices - region.centre, axis=1) <= region.radius
     else:
@@ -112,7 +112,7 @@ def pore_at(mesh: PoreMesh, position: np.ndarray) -> int:
     """The pore that a point (3,) of the box stands for [m]; see `Point`."""
     distances = np.linalg.norm(mesh.packing.centres - position, axis=1)
     if (distances < mesh.packing.radii).any():
-        return int(np.argmin(np.linalg.norm(mesh.pore_points - position, axis=1)))
+        return int(np.argmin(np.linalg.norm(mesh.pore_centres - position, axis=1)))
     # Cells are convex: a point is in the cell whose facets it is all behind.
     facets = mesh.facets
     local = position - mesh.triangulation.origin

@@ -35,7 +35,7 @@ def hydraulic_tortuosity(mesh: PoreMesh, flux: np.ndarray, face_flux: np.ndarray
     ----------
     A. Duda, Z. Koza, M. Matyka: Hydraulic tortuosity in arbitrary porous media flow. Phys. Rev. E 84, 036319 (2011).
     """
-    points, faces, box = mesh.pore_points, mesh.wall_faces, mesh.box
+    points, faces, box = mesh.pore_centres, mesh.wall_faces, mesh.box
     i, j = mesh.throats.pores.T
     lengths = np.linalg.norm(points[j] - points[i], axis=1)
     across = WALL_AXES[faces.walls]

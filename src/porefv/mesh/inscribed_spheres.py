@@ -67,7 +67,7 @@ def inscribed_spheres(mesh: PoreMesh) -> InscribedSpheres:
         for side in (0, 1):
             _keep_better(found, pores[rows, side], points, radii)
     without = found.radii == 0.0
-    found.centres[without] = mesh.pore_points[without]
+    found.centres[without] = mesh.pore_centres[without]
     return found
 
 

@@ -124,7 +124,7 @@ class PoreMesh(CellMesh):
         return np.bincount(self.cell_pore, self.cell_surfaces, self.n_pores)
 
     @lazy_property
-    def pore_points(self) -> np.ndarray:
+    def pore_centres(self) -> np.ndarray:
         """(n_pores, 3): Laguerre vertex of each pore, that of a united pore the mean of those of its cells [m]."""
         if not self.n_united:
             return self.vertices

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from porefv.errors import InputError
 from porefv.mesh.facet_kernels import row_sums, sector_angles
 from porefv.mesh.inscribed_circles import Circles, TiedCircles, circles_of_throats, inscribed_circles
 from porefv.mesh.uniting import tied_facets
@@ -146,6 +147,39 @@ class Throats(FixedInputs):
         return self.mesh.cell_pore[self.mesh.facets.cells[self.first_facets]]
 
     @lazy_property
+    def spheres(self) -> np.ndarray:
+        """(t, 3) int32: vertices of the first facet of each throat, spheres first; n_spheres + w for wall w."""
+        return self.mesh.facets.vertices[self.first_facets]
+
+    def between(self, i: int, j: int, k: int) -> int:
+        """The throat between three vertices of the mesh, in any order.
+
+        Parameters
+        ----------
+        i, j, k : int
+            Ids of spheres, or n_spheres + w for wall w of `porefv.WALLS`.
+
+        Raises
+        ------
+        InputError
+            If the triangulation has no facet of these three, or it lies inside a united pore.
+
+        Examples
+        --------
+        >>> throats = PoreMesh(Packing.read("data/packings/n25_s1.csv")).throats
+        >>> throats.between(*throats.spheres[7])
+        7
+        """
+        wanted = sorted(int(vertex) for vertex in (i, j, k))
+        found = np.flatnonzero((np.sort(self.mesh.facets.vertices, axis=1) == wanted).all(axis=1))
+        if len(found) == 0:
+            raise InputError(f"there is no facet of the vertices {i}, {j} and {k}: `spheres` has those of all throats")
+        throat = int(self.facet_throat[found[0]])
+        if throat < 0:
+            raise InputError(f"the facet of the vertices {i}, {j} and {k} lies inside a united pore: it is no throat")
+        return throat
+
+    @lazy_property
     def normals(self) -> np.ndarray:
         """(t, 3): unit normal of each throat, from its first pore to its second."""
         return self.mesh.facets.normals[self.first_facets]
@@ -192,6 +226,11 @@ class Throats(FixedInputs):
         """(t,): Σγ^k of each throat over its spheres and no-slip walls [m²]."""
         return self._total(row_sums(read_only(self.mesh.facets.wetted_surfaces(slip))))
 
+    def hydraulic_radii(self, slip: np.ndarray) -> np.ndarray:
+        """(t,): φ / Σγ of each throat, zero where Σγ is not positive [m]; `slip` as for `wetted_surfaces`."""
+        surfaces = self.wetted_surfaces(slip)
+        return np.divide(self.volumes, surfaces, out=np.zeros(len(self)), where=surfaces > 0.0)
+
     def inscribed_radii(self, slip: np.ndarray) -> np.ndarray:
         """(t,): radius of the circle in the throat's plane tangent to its spheres and no-slip walls [m].
 
@@ -219,6 +258,16 @@ class Throats(FixedInputs):
         whole = 1.0 / self.mirror_images(slip)
         portions = np.where(radii > 0.0, np.clip(portions, 0.05 * whole, whole), whole)
         return self._inscribed.setdefault(slip.tobytes(), (radii, portions))
+
+    def inscribed_centres(self, slip: np.ndarray) -> np.ndarray:
+        """(t, 3): centres of the circles of `inscribed_radii`; a corner's where there is no circle [m]."""
+        slip = np.asarray(slip, bool)
+        mesh = self.mesh
+        circles = Circles(np.empty(len(self)), np.empty((len(self), 3)))
+        for_rows(inscribed_circles, len(self), self.spheres, mesh.cell_vertices, slip, circles)
+        tied = self._tied_circles(slip)
+        circles.centres[tied.throats] = tied.centres
+        return circles.centres + mesh.triangulation.origin
 
     def roundness(self, slip: np.ndarray) -> np.ndarray:
         """(t,): λ, radius of the inscribed circle over that of the circle of the neck's area; 1 without either.

@@ -34,7 +34,7 @@ UNITS = {
     "wall_flux": "m3/s", "wall_pressure": "Pa",
     "flow": "m3/s", "velocity": "m/s", "pore_volume": "m3", "box": "m", "radii": "m", "gap": "m", "viscosity": "Pa s",
     "density": "kg/m3", "gravity": "m/s2", "pressure": "Pa", "sums": "N", "thrust": "N", "seconds": "s",
-    "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1",
+    "pore_sizes": "m", "constriction_sizes": "m", "planes": "m3/s", "tortuosity": "1", "reynolds": "1",
     "diffusion": "1",
     "profile": "1",
 }  # fmt: skip
@@ -174,6 +174,8 @@ def _flow(flow: PoreFlow, quantities: Collection[str], table_format: str) -> dic
             {"region": region_text(fixed.region), "pressure": fixed.pressure, "flow": flux}
             for fixed, flux in zip(flow.fixed_pressures, flow.fixed_pressure_flux, strict=True)
         ]
+    if flow.reynolds is not None:
+        found["reynolds"] = {"sample": flow.reynolds, "largest_pore": flow.pore_reynolds}
     if (reliability := tested_reliability(flow)) is not None:
         found["reliability"] = asdict(reliability)
     if "permeability" in quantities:

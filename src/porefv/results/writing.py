@@ -19,8 +19,6 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
 from porefv.errors import InputError, OutOfRangeWarning
 from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
 from porefv.export.vtk_files import vtk_data_model, write_xml
@@ -30,6 +28,7 @@ from porefv.flow.directional_permeabilities import (
     slip_of_impervious_walls,
 )
 from porefv.flow.pore_flow import PoreFlow
+from porefv.flow.reynolds import inertia_warning
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.free_space import wall_layers, warn_of_free_space
 from porefv.results.force_table import FORCE_FILES, PARTS, write_forces
@@ -222,6 +221,8 @@ def save(
     reliability = None if flow is None else tested_reliability(flow)
     if reliability is not None and (said := reliability.warning):
         warnings.warn(said, OutOfRangeWarning, stacklevel=2)
+    if flow is not None and flow.reynolds is not None and (said := inertia_warning(flow.reynolds)):
+        warnings.warn(said, OutOfRangeWarning, stacklevel=2)
     layers = wall_layers(mesh.packing)
     warn_of_free_space(layers, mesh.packing)
     text = summary_json(
@@ -240,10 +241,7 @@ def _write_vtk(folder: Path, mesh: PoreMesh, flow: PoreFlow | None, quantities: 
     }
     spheres = {}
     if flow is not None:
-        surfaces = mesh.throats.wetted_surfaces(flow.walls.slip)
-        throats["hydraulic_radius"] = np.divide(
-            mesh.throats.volumes, surfaces, out=np.zeros(len(surfaces)), where=surfaces > 0.0
-        )
+        throats["hydraulic_radius"] = mesh.throats.hydraulic_radii(flow.walls.slip)
         throats["conductance"] = flow.conductances
         throats["flux"] = flow.flux
         if "pressure" in quantities:

@@ -170,11 +170,13 @@ class FluidTable(Table):
 
     viscosity: Annotated[float, Limits(above=0.0)] = key("dynamic viscosity, positive", Fluid.viscosity, unit="Pa s")
     density: Annotated[float, Limits(least=0.0)] = key(
-        "density, for the hydraulic conductivity and for buoyancy", Fluid.density, unit="kg/m³"
-    )
+        "density, for the hydraulic conductivity and for buoyancy; if it is given, for the Reynolds number, too",
+        float(Fluid.density), unit="kg/m³",
+    )  # fmt: skip
 
     def make(self) -> Fluid:
-        return Fluid(self.viscosity, self.density)
+        given = "density" in self.model_fields_set
+        return Fluid(self.viscosity, self.density) if given else Fluid(self.viscosity)
 
 
 class ConductanceTable(Table):
