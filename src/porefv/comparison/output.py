@@ -5,10 +5,15 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from porefv.comparison.comparison import MethodComparison
+from porefv.export.picture_style import PictureSize, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def table(found: MethodComparison) -> str:
@@ -55,9 +60,14 @@ def save(found: MethodComparison, folder: Path) -> None:
 
 def draw(found: MethodComparison, path: Path) -> None:
     """Draw the error of the forces against time and against memory, the Pareto front joined."""
-    from matplotlib.figure import Figure
+    with style():
+        figure = _errors_picture(found)
+        figure.savefig(path, dpi=figure.dpi)
 
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
+
+def _errors_picture(found: MethodComparison) -> Figure:
+    """The picture of `draw`."""
+    figure = new_figure(PictureSize(1600, 700), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     others = [result for result in found.results if result is not found.reference]
     for axis, measure, label in (
@@ -73,5 +83,5 @@ def draw(found: MethodComparison, path: Path) -> None:
             axis.axvline(measure(found.reference), color="k", ls=":", label="resolved Stokes flow")
         axis.set_xlabel(label)
     axes[0].set_ylabel("error of the forces, rms")
-    axes[1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path, dpi=110)
+    axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

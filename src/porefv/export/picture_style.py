@@ -162,6 +162,16 @@ def round_ticks(axis: Any, most: int = 6) -> None:
     axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
 
 
+def label_in_unit(axis: Any, quantity: str, most: float, unit: str, remark: str = "") -> None:
+    """Label an axis of data in SI units, and show its numbers in the unit with the prefix for values up to `most`."""
+    from matplotlib.ticker import FuncFormatter
+
+    scale = unit_for(most, unit)
+    axis.set_label_text(f"{quantity}, {scale.name}{remark}", parse_math=False)
+    # Twelve digits hide the rounding of the factor.
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value * scale.factor:.12g}"))
+
+
 class Colours(NamedTuple):
     """A scale of colours.
 
