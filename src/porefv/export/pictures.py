@@ -145,7 +145,7 @@ def _picture_3d(data: PictureData, what: str, title: str, size: PictureSize) -> 
         with style():
             legend = new_figure(size)
             legend.patch.set_alpha(0.0)
-            _explain(legend, title, scene.colours, (*scene.notes, marks["bar"].text))
+            _explain(legend, title, scene.colours, (*scene.notes, f"the bar has {marks['bar'].text}"))
         write_html(plotter, legend, path)
 
     with style():
