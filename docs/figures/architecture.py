@@ -18,6 +18,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
+from porefv.export.picture_style import style
+
 ROOT = Path(__file__).resolve().parents[2]
 # What each folder gives to those below it.
 GIVES = {
@@ -68,7 +70,8 @@ def main() -> None:
             if a != b and a in GIVES and b in GIVES:
                 (up if (importer, imported) in exceptions else down).add((a, b))
 
-    figure, axes = plt.subplots(figsize=(9.5, 9.5), layout="constrained")
+    with style():
+        figure, axes = plt.subplots(figsize=(9.5, 9.5), layout="constrained")
     place = {name: -k for k, name in enumerate(folders)}
     for name, y in place.items():
         axes.add_patch(

@@ -1,4 +1,4 @@
-"""The pictures of docs/plot.md and docs/img/n2000.png, by `porefv plot`.
+"""The pictures of docs/plot.md, docs/simulate.md and docs/quantities.md, and docs/img/n2000.png, by `porefv plot`.
 
 python docs/figures/plots.py
 """
@@ -12,7 +12,6 @@ from pathlib import Path
 from small_png import FOLDER, shrink
 
 from porefv.cli import main as porefv
-from porefv.scenes import FlowScene
 
 SCENES = Path(__file__).resolve().parents[2] / "data" / "scenes"
 PLOTS = {
@@ -22,19 +21,23 @@ PLOTS = {
     "plot_section": ("n2000", "--what", "section"),
     "plot_velocity": ("n2000", "--what", "velocity", "--size", "1200x900", "--dpi", "150"),
     "plot_sc8": ("sc8", "--what", "network"),
+    "oedometer": ("oedometer",),
+    "quantities_profile": ("quantities", "--what", "profile"),
+    "quantities_pore_sizes": ("quantities", "--what", "pore_sizes"),
+    "quantities_constriction_sizes": ("quantities", "--what", "constriction_sizes"),
 }
 
 
 def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for scene in {scene for scene, *_ in PLOTS.values()}:
-            if status := porefv(["solve", str(SCENES / f"{scene}.toml"), "--force", "--quiet"]):
+            command = "simulate" if scene == "oedometer" else "solve"
+            if status := porefv([command, str(SCENES / f"{scene}.toml"), "--force", "--quiet"]):
                 return status
         for name, (scene, *options) in PLOTS.items():
             path = Path(folder) / f"{name}.png"
-            directory = FlowScene.read(SCENES / f"{scene}.toml").output.directory
-            size = [] if "--size" in options else ["--size", "800x600", "--dpi", "100"]
-            if status := porefv(["plot", str(directory), "--out", str(path), *options, *size]):
+            size = [] if "--size" in options or scene == "oedometer" else ["--size", "800x600", "--dpi", "100"]
+            if status := porefv(["plot", str(SCENES / "results" / scene), "--out", str(path), *options, *size]):
                 return status
             shrink(path, FOLDER / f"{name}.png")
     return 0

@@ -18,10 +18,10 @@ def save(figure: Figure, name: str) -> None:
     """Write docs/img/NAME.png."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=figure.dpi)
-    shrink(buffer, FOLDER / f"{name}.png")
+    shrink(buffer, FOLDER / f"{name}.png", Image.Quantize.MEDIANCUT)
 
 
-def shrink(source: Path | io.BytesIO, path: Path) -> None:
-    """Write a picture with 256 colours."""
+def shrink(source: Path | io.BytesIO, path: Path, method: Image.Quantize = Image.Quantize.MAXCOVERAGE) -> None:
+    """Write a picture with 256 colours; MAXCOVERAGE keeps the ends of scales, MEDIANCUT shades."""
     image = Image.open(source).convert("RGB")
-    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
+    image.quantize(256, method=method, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -5,7 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from porefv.export.picture_style import FONTS, Colours, in_unit, new_figure, round_length, style, unit_for
+from porefv.export.picture_style import (
+    FONTS,
+    Colours,
+    in_unit,
+    label_in_unit,
+    new_figure,
+    round_length,
+    style,
+    unit_for,
+)
 
 
 @pytest.mark.parametrize(("most", "unit", "name"), [
@@ -51,6 +60,18 @@ def test_the_scale_of_colours_names_its_unit_and_has_round_ticks():
     assert axes.get_title(loc="left") == "force on a grain, mN"
     ticks = [tick for tick in axes.get_yticks() if 0.0 <= tick <= 1.42]
     assert ticks == [0.0, 0.5, 1.0]
+
+
+def test_an_axis_shows_its_numbers_in_a_unit_with_prefix():
+    pytest.importorskip("matplotlib")
+    with style():
+        axes = new_figure().add_subplot()
+        axes.plot([0.0, 6.0e-3], [0.0, 4500.0])
+        label_in_unit(axes.yaxis, "pressure", 4500.0, "Pa", " (mean)")
+        label_in_unit(axes.xaxis, "time", 6.0e-3, "s")
+    assert axes.get_ylabel() == "pressure, kPa (mean)" and axes.get_xlabel() == "time, ms"
+    shown = axes.yaxis.get_major_formatter()
+    assert [shown(value, 0) for value in (0.0, 2500.0, 0.3)] == ["0", "2.5", "0.0003"]
 
 
 def test_the_style_ends_with_its_block():

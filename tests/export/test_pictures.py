@@ -7,6 +7,7 @@ import pytest
 from porefv import results
 from porefv.errors import ComputationError, InputError
 from porefv.export import picture, rendering
+from porefv.export.picture_style import Colours
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
@@ -141,6 +142,26 @@ def test_a_grain_is_drawn_to_the_scale_of_the_bar():
     assert len(columns) / len(rows) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("sides", [(1, 1, 10), (10, 1, 1), (1, 10, 10), (1, 1, 1)])
+def test_sections_are_to_scale_and_ticks_have_room(sides):
+    box = Box([0, 0, 0], sides)
+    packing = Packing([[0.5, 0.5, 0.5]], [0.4], box)
+    for axis, (across, up) in zip("xyz", ((1, 2), (0, 2), (0, 1)), strict=True):
+        axes = picture(packing, "section", axis=axis).figure.axes[0]
+        size = axes.get_position().size * axes.figure.get_size_inches()
+        assert size[1] / size[0] == pytest.approx(sides[up] / sides[across])
+        for length, ticks in zip(size, (axes.get_xticks(), axes.get_yticks()), strict=True):
+            assert len(ticks) <= max(3, length / 0.35)
+
+
+def test_a_scale_of_speeds_is_pointed_if_a_few_are_much_higher():
+    speeds = np.append(np.linspace(0.0, 1.0, 1000), 9.0)
+    scale = Colours.of_speeds("speed", speeds)
+    assert scale.beyond and scale.high / scale.unit.factor < 1.0
+    assert not Colours.of_speeds("speed", speeds[:-1]).beyond
+    assert np.array_equal(scale.of(speeds)[-1], scale.of(speeds)[-2])
+
+
 def test_files_have_the_format_of_their_name(flow, tmp_path):
     section = flow.plot("section", **SMALL)
     for name, begin in (("a.png", b"\x89PNG"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF")):
@@ -182,6 +203,7 @@ def test_a_notebook_shows_the_picture(flow):
     ({"what": "section", "axis": "w"}, "must be x, y or z"),
     ({"size": (10, 300)}, "100 to 10 000 pixels"),
     ({"dpi": 0}, "30 to 1200 pixels per inch"),
+    ({"size": (400, 300)}, r"2 x 1.5 inches; the letters need 3.5 x 2.5"),
 ])  # fmt: skip
 def test_what_cannot_be_drawn_is_refused(flow, options, said):
     with pytest.raises(InputError, match=said):

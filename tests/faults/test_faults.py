@@ -309,13 +309,15 @@ def test_simulate_resume(survives, killed, whole_run, tmp_path):
     survives(arguments, lambda folder: put(stopped, folder, "scene.toml", "results"), check)
 
 
-class Picture:
-    def savefig(self, path, dpi):
+class Figure:
+    dpi = 100
+
+    def savefig(self, path, **options):
         path.write_bytes(b"picture")
 
 
 def test_plot(survives, whole_run, monkeypatch):
-    monkeypatch.setattr("porefv.simulation.series_picture.series_picture", lambda directory: Picture())
+    monkeypatch.setattr("porefv.simulation.series_picture.series_picture", lambda directory: Figure())
     arguments = ["plot", "results", "--out", "picture.png"]
 
     def prepare(folder):

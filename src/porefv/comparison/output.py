@@ -5,11 +5,16 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from porefv.comparison.comparison import MethodComparison
 from porefv.comparison.measurement import MethodResult
+from porefv.export.picture_style import PictureSize, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def table(found: MethodComparison) -> str:
@@ -68,7 +73,13 @@ def draw(found: MethodComparison, path: Path) -> None:
     Models are measured from the reference, tolerances from the smallest of them. An error of zero stands on the lower
     edge.
     """
-    from matplotlib.figure import Figure
+    with style():
+        figure = _errors_picture(found)
+        figure.savefig(path, dpi=figure.dpi)
+
+
+def _errors_picture(found: MethodComparison) -> Figure:
+    """The picture of `draw`."""
     from matplotlib.ticker import NullFormatter
 
     models = [result for result in found.results if result.method.tolerance is None]
@@ -76,7 +87,7 @@ def draw(found: MethodComparison, path: Path) -> None:
     rows = [("error of the forces, rms", models, found.reference)]
     if tolerances:
         rows.append(("error by the solver's tolerance, rms", tolerances, tolerances[-1]))
-    figure = Figure(figsize=(10, 4.0 * len(rows)), layout="constrained")
+    figure = new_figure(PictureSize(1600, 650 * len(rows)), layout="constrained")
     for axes, (label, results, reference) in zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True):
         errors = [MethodComparison(results, reference).errors(result)[1] for result in results]
         known = [error for error in errors if error > 0.0]
@@ -90,9 +101,9 @@ def draw(found: MethodComparison, path: Path) -> None:
                 place, name = measure(result), _label(result).strip()
                 if not (np.isfinite(place) and place > 0.0):
                     continue
-                style = {"marker": "*", "s": 140, "color": "k"} if result is reference else {"marker": "o", "s": 45}
+                drawn = {"marker": "*", "s": 140.0, "color": "k"} if result is reference else {"marker": "o", "s": 45.0}
                 name = f"{name} (reference)" if result is reference else name
-                axis.scatter(place, error if error > 0.0 else lowest, label=name, clip_on=False, zorder=3, **style)
+                axis.scatter(place, error if error > 0.0 else lowest, label=name, clip_on=False, zorder=3, **drawn)
             places = [place for place in map(measure, results) if np.isfinite(place) and place > 0.0]
             if places and max(places) > 10.0 * min(places):
                 axis.set_xscale("log")
@@ -105,4 +116,4 @@ def draw(found: MethodComparison, path: Path) -> None:
         axes[1].legend(
             *axes[0].get_legend_handles_labels(), fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
         )  # fmt: skip
-    figure.savefig(path, dpi=110)
+    return figure

@@ -9,14 +9,18 @@ from pathlib import Path
 from signal import getsignal, signal
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from porefv.system.optional_imports import ensure_installed
 from porefv.system.signals import ENDING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Angle of view of vtk.js [degrees].
+_VIEW_ANGLE = 30.0
 # The scales of colours lie over the scene, and let the mouse through.
-_LEGEND = """<div style="position:fixed;top:0;right:0;height:100%;pointer-events:none">
+_LEGEND = """<div style="position:fixed;top:0;right:0;height:100%;z-index:10;pointer-events:none">
 <style>.porefv svg {{ height: 100vh; width: auto; }}</style><div class="porefv">
 {svg}
 </div></div>
@@ -35,6 +39,17 @@ def _signals_kept() -> Iterator[None]:
                 signal(number, handler)
 
 
+def _see_in_perspective(camera: Any) -> None:
+    """What a browser is given of a camera is its place alone: put it where as much is seen in vtk.js's perspective."""
+    focus, position = np.array(camera.focal_point), np.array(camera.position)
+    towards = (position - focus) / np.linalg.norm(position - focus)
+    # A little farther: what is in front looks larger.
+    camera.position = focus + 1.12 * towards * camera.parallel_scale / np.tan(np.radians(0.5 * _VIEW_ANGLE))
+    camera.parallel_projection = False
+    camera.view_angle = _VIEW_ANGLE
+    camera.clipping_range = (0.05, 20.0)
+
+
 def write_html(plotter: Any, legend: Figure, path: Path) -> None:
     """Write the scene of a plotter, with a figure that explains it, as one file.
 
@@ -44,6 +59,7 @@ def write_html(plotter: Any, legend: Figure, path: Path) -> None:
         If trame-pyvista is not installed.
     """
     ensure_installed("trame_pyvista", "trame-pyvista", "Writing an HTML picture")
+    _see_in_perspective(plotter.camera)
     with _signals_kept():
         page = plotter.trame.export_html(None).getvalue()
     plotter.close()

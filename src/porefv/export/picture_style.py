@@ -6,9 +6,12 @@ Pictures of grains and pores, diagrams of quantities and simulations, and the fi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from porefv.errors import InputError
 from porefv.system.optional_imports import ensure_installed
@@ -37,6 +40,9 @@ FONTS: Any = {
     "font.family": "DejaVu Sans",
 }  # fmt: skip
 SMALL = 8.0  # points, of notes
+SMALLEST = (3.5, 2.5)  # width and height of a picture [inches]
+# Room around what is drawn [inches]: for the scales of colours at the right, the title above, a line of notes below.
+_SCALES, _TITLE, _LINE, _EDGE = 1.42, 0.5, 0.15, 0.2
 
 _PREFIXES = {
     -24: "y", -21: "z", -18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G",
@@ -75,10 +81,66 @@ class PictureSize(NamedTuple):
             )
         if not 30 <= self.dpi <= 1200:
             raise InputError(f"the resolution must be 30 to 1200 pixels per inch, not {self.dpi:g}")
+        width, height = self.inches
+        if width < SMALLEST[0] or height < SMALLEST[1]:
+            raise InputError(
+                f"{self.width} x {self.height} pixels at {self.dpi:g} pixels per inch are {width:.2g} x {height:.2g} "
+                f"inches; the letters need {SMALLEST[0]:g} x {SMALLEST[1]:g}. Give more pixels, or fewer per inch."
+            )
         return self
 
 
 SIZE = PictureSize()
+
+
+class Layout:
+    """Where things are in a picture, whatever its size: letters keep theirs.
+
+    Parameters
+    ----------
+    size : PictureSize
+    notes : sequence of str
+        What is written below.
+
+    Attributes
+    ----------
+    notes : str
+        With line breaks.
+    free : (4,) tuple of float
+        What is left for the sample, as fractions of the picture: left, right, bottom, top.
+    """
+
+    def __init__(self, size: PictureSize, notes: Sequence[str] = ()):
+        self._width, self._height = size.inches
+        letters = int((self._width - 2 * _EDGE) * 72.0 / (0.56 * SMALL))
+        self.notes = fill("; ".join(notes), letters)
+        lines = self.notes.count("\n") + 1 if notes else 0
+        self.free = (
+            _EDGE / self._width,
+            1.0 - (_SCALES + 2 * _EDGE) / self._width,
+            (_EDGE + (lines + 1) * _LINE) / self._height,
+            1.0 - _TITLE / self._height,
+        )
+
+    def write(self, figure: Figure, title: str = "") -> None:
+        """Write the title above and the notes below."""
+        left = _EDGE / self._width
+        if title:
+            top = 1.0 - _EDGE / self._height
+            figure.text(left, top, title, va="top", fontsize=FONTS["figure.titlesize"], parse_math=False)
+        if self.notes:
+            figure.text(left, 0.6 * _EDGE / self._height, self.notes, fontsize=SMALL, color=PALE_INK, parse_math=False)
+
+    def scale(self, place: int, places: int) -> tuple[float, float, float, float]:
+        """Left, bottom, width and height of a scale of colours, the first of several above the others."""
+        low, high = _EDGE + 2 * _LINE, self._height - 0.3
+        each = (high - low) / max(places, 2)
+        return (
+            1.0 - _SCALES / self._width,
+            (high - (place + 1) * each + 0.1) / self._height,
+            0.16 / self._width,
+            (each - 0.55) / self._height,
+        )
 
 
 class Unit(NamedTuple):
@@ -162,6 +224,16 @@ def round_ticks(axis: Any, most: int = 6) -> None:
     axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
 
 
+def label_in_unit(axis: Any, quantity: str, most: float, unit: str, remark: str = "") -> None:
+    """Label an axis of data in SI units, and show its numbers in the unit with the prefix for values up to `most`."""
+    from matplotlib.ticker import FuncFormatter
+
+    scale = unit_for(most, unit)
+    axis.set_label_text(f"{quantity}, {scale.name}{remark}", parse_math=False)
+    # Twelve digits hide the rounding of the factor.
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value * scale.factor:.12g}"))
+
+
 class Colours(NamedTuple):
     """A scale of colours.
 
@@ -174,6 +246,8 @@ class Colours(NamedTuple):
         Values at the ends, in the unit.
     colour_map : str
         Of matplotlib.
+    beyond : bool
+        Whether there are values above the upper end: it is pointed then.
     """
 
     label: str
@@ -181,6 +255,14 @@ class Colours(NamedTuple):
     low: float
     high: float
     colour_map: str
+    beyond: bool = False
+
+    @classmethod
+    def of_speeds(cls, label: str, speeds: np.ndarray) -> Colours:
+        """The scale of speeds from zero; it leaves out the highest hundredth if these are much higher than others."""
+        most, usual = float(speeds.max()), float(np.quantile(speeds, 0.99))
+        far = most > 1.5 * usual > 0.0
+        return cls.over(label, "m/s", 0.0, usual if far else most, SPEEDS)._replace(beyond=far)
 
     @classmethod
     def over(cls, label: str, unit: str, low: float, high: float, colour_map: str) -> Colours:
@@ -218,7 +300,7 @@ class Colours(NamedTuple):
 
     def draw(self, axes: Axes) -> None:
         """Fill axes with the scale: its label above, its ticks at the right."""
-        bar = axes.figure.colorbar(self.mappable, cax=axes)  # type: ignore[union-attr]
+        bar = axes.figure.colorbar(self.mappable, cax=axes, extend="max" if self.beyond else "neither")  # type: ignore[union-attr]
         round_ticks(bar.ax.yaxis, 5)
         bar.ax.set_title(f"{self.label}, {self.unit.name}", loc="left", pad=7.0)
         bar.outline.set_linewidth(0.0)  # type: ignore[operator]

@@ -5,6 +5,7 @@ Typically: `flow.plot("section", axis="x").save("section.svg")`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,10 +27,9 @@ from porefv.export.picture_output import Picture
 from porefv.export.picture_style import (
     FLOW,
     INK,
-    PALE_INK,
     SIZE,
-    SMALL,
     Colours,
+    Layout,
     PictureSize,
     new_figure,
     round_length,
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["KINDS", "draw", "picture"]
-
-# Part of a picture in three dimensions that the sample fills, as fractions: left, right, bottom, top.
-_FREE = (0.03, 0.78, 0.07, 0.91)
 
 
 def picture(
@@ -145,13 +142,13 @@ def _picture_3d(data: PictureData, what: str, title: str, size: PictureSize) -> 
         with style():
             legend = new_figure(size)
             legend.patch.set_alpha(0.0)
-            _explain(legend, title, scene.colours, (*scene.notes, marks["bar"].text))
+            _explain(legend, size, title, scene.colours, (*scene.notes, f"the bar has {marks['bar'].text}"))
         write_html(plotter, legend, path)
 
     with style():
         figure = new_figure(size)
         figure.figimage(image, origin="upper", zorder=-1)
-        _explain(figure, title, scene.colours, notes)
+        _explain(figure, size, title, scene.colours, notes)
         for mark in marks.values():
             x, y = mark.place
             figure.text(x, y, mark.text, color=mark.colour, ha=mark.across, va=mark.upwards)
@@ -176,7 +173,8 @@ def _plotter(data: PictureData, what: str, size: PictureSize, triangles: int) ->
     view = View(data.box, 2 if data.axis is None else data.axis)
     scene = Scene(pv, plotter, data, view, triangles, line_width=1.5 * size.dpi / SIZE.dpi)
     scene.fill(what)
-    gap = 0.06 + scene.margin
+    # Of the box from what stands beside it: in a small picture letters are larger.
+    gap = 0.06 * max(1.0, SIZE.inches[0] / size.inches[0]) + scene.margin
     extent = [view.corner(*signs) for signs in product((-1, 1), repeat=3)]
     # A bar of a round length, below the lower edge at the right.
     side = float(2.0 * view.half[view.left])
@@ -196,7 +194,7 @@ def _plotter(data: PictureData, what: str, size: PictureSize, triangles: int) ->
         below = tail - 0.03 * sense * view.normal(view.axis)
         marks["flow"] = _Mark(below, "flow", FLOW, "center", "top" if sense > 0.0 else "bottom")
         extent += [tail - 0.06 * view.across, tail - 0.06 * view.up * sense]
-    projection = Projection(view, np.array(extent), size, _FREE, margin=scene.margin)
+    projection = Projection(view, np.array(extent), size, Layout(size, scene.notes).free, margin=scene.margin)
     projection.aim(plotter)
     plotter.enable_anti_aliasing("msaa", multi_samples=8)
     return plotter, scene, {name: mark._replace(place=projection.fraction(mark.place)) for name, mark in marks.items()}
@@ -210,11 +208,9 @@ def _sense(data: PictureData) -> float:
     return float(np.sign(lower - upper))
 
 
-def _explain(figure: Figure, title: str, colours: list[Colours], notes: tuple[str, ...]) -> None:
+def _explain(figure: Figure, size: PictureSize, title: str, colours: list[Colours], notes: Sequence[str]) -> None:
     """Title, scales of colours one above the other, and notes."""
-    if title:
-        figure.text(0.03, 0.965, title, va="top", fontsize=10.0, parse_math=False)
-    for scale, bottom in zip(colours, (0.53, 0.09), strict=False):
-        scale.draw(figure.add_axes((0.82, bottom, 0.022, 0.33)))
-    if notes:
-        figure.text(0.03, 0.02, "; ".join(notes), fontsize=SMALL, color=PALE_INK)
+    layout = Layout(size, notes)
+    layout.write(figure, title)
+    for place, scale in enumerate(colours):
+        scale.draw(figure.add_axes(layout.scale(place, len(colours))))

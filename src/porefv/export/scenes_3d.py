@@ -15,7 +15,6 @@ from porefv.export.picture_style import (
     GRAIN_SECTION,
     INK,
     PRESSURES,
-    SPEEDS,
     Colours,
     in_unit,
 )
@@ -192,7 +191,7 @@ class Scene:
             values, look = pressure[ends] * scale.unit.factor, _by_scalars("value", scale)
         elif what == "throats" and flux is not None:
             speeds = np.abs(flux[shown]) / network.fluid_areas[shown]
-            scale = Colours.over("mean speed in the\nconstriction", "m/s", 0.0, float(speeds.max()), SPEEDS)
+            scale = Colours.of_speeds("mean speed in the\nconstriction", speeds)
             self.colours.append(scale)
             values, look = np.repeat(speeds[:, None] * scale.unit.factor, 2, axis=1), _by_scalars("value", scale)
         lines = self.pv.PolyData(self.view.place(network.points)[ends].reshape(-1, 3))

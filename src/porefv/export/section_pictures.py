@@ -14,9 +14,8 @@ from porefv.export.picture_style import (
     PALE_INK,
     PRESSURES,
     SIZE,
-    SMALL,
-    SPEEDS,
     Colours,
+    Layout,
     PictureSize,
     Unit,
     in_unit,
@@ -62,7 +61,7 @@ def section_picture(
     plane = Plane.through(data.box, axis, at, data.axis)
     discs = cut_spheres(data.centres, data.radii, plane)
     with style():
-        figure = new_figure(size, layout="constrained")
+        figure = new_figure(size)
         axes = figure.add_subplot()
         unit = frame(axes, data, plane)
         notes = [] if len(discs.radii) else ["the plane cuts no grain"]
@@ -73,9 +72,9 @@ def section_picture(
             polygons = cut_cells(data.cells.polyhedra, plane)
             pores = data.cells.pore[polygons.cells]
             if what == "velocity" and data.velocity is not None:
-                speeds = np.linalg.norm(data.velocity, axis=1)
-                colours = Colours.over("speed in the\npores", "m/s", 0.0, speeds[pores].max(), SPEEDS)
-                add_cells(axes, polygons, unit, colours.of(speeds[pores]))
+                speeds = np.linalg.norm(data.velocity, axis=1)[pores]
+                colours = Colours.of_speeds("speed in the\npores", speeds)
+                add_cells(axes, polygons, unit, colours.of(speeds))
                 notes += add_velocities(axes, data, plane, polygons, discs, unit)
             elif data.pressure is not None:
                 values = data.pressure
@@ -85,18 +84,26 @@ def section_picture(
                 add_cells(axes, polygons, unit, None)
                 notes.append("cells of the mesh; no pressure in these data")
         add_discs(axes, discs, unit)
+        layout = Layout(size, notes)
+        _place(axes, layout, size, plane.project(data.box.size[None])[0])
         if colours is not None:
-            colours.draw(axes.inset_axes((1.06, 0.2, 0.035, 0.6)))
+            colours.draw(figure.add_axes(layout.scale(0, 1)))
         place = f"{'xyz'[plane.normal]} = {plane.at * unit.factor:.4g} {unit.name}"
-        axes.set_title(
-            f"{title},  {place}" if title else place,
-            loc="left",
-            pad=16.0 if what == "velocity" else 8.0,
-            parse_math=False,
-        )
-        if notes:
-            figure.supxlabel("; ".join(notes), fontsize=SMALL, color=PALE_INK)
+        layout.write(figure, f"{title},  {place}" if title else place)
     return Picture(figure, tuple(notes))
+
+
+def _place(axes: Axes, layout: Layout, size: PictureSize, sides: np.ndarray) -> None:
+    """Put axes to scale into what is free of a picture, with as many ticks as there is room for."""
+    left, right, bottom, top = layout.free
+    width, height = size.inches
+    left, bottom = left + 0.55 / width, bottom + 0.35 / height
+    room = np.array([(right - left) * width, (top - bottom) * height])
+    inches = sides * (room / sides).min()
+    corner = np.array([left * width, bottom * height]) + 0.5 * (room - inches)
+    axes.set_position((corner[0] / width, corner[1] / height, inches[0] / width, inches[1] / height))
+    for axis, length in ((axes.xaxis, inches[0]), (axes.yaxis, inches[1])):
+        round_ticks(axis, int(np.clip(length / 0.5, 1, 6)))
 
 
 def frame(axes: Axes, data: PictureData, plane: Plane) -> Unit:
@@ -108,7 +115,6 @@ def frame(axes: Axes, data: PictureData, plane: Plane) -> Unit:
     axes.set_ylim(lower[1], upper[1])
     for which, name in ((axes.xaxis, plane.across), (axes.yaxis, plane.up)):
         which.set_label_text(f"{'xyz'[name]}, {unit.name}")
-        round_ticks(which)
     return unit
 
 

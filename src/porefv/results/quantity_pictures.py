@@ -63,7 +63,7 @@ def quantity_picture(
             axes[0].set_ylabel("part of the throats that is not larger")
         for ax in axes:
             ax.grid(alpha=0.3)
-            round_ticks(ax.xaxis, 5)
+            round_ticks(ax.xaxis, 6)
         scene, spheres = results.summary.get("scene"), results.summary["packing"]["spheres"]
         title = f"{Path(scene).stem}: {spheres} spheres" if scene else f"{spheres} spheres"
         figure.suptitle(title, parse_math=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,16 @@ import numpy as np
 
 from porefv.errors import InputError, counted
 from porefv.export.picture_output import FORMATS_2D, Picture
-from porefv.export.picture_style import AXIS_COLOURS, PALE_INK, SIZE, SMALL, PictureSize, new_figure, style
+from porefv.export.picture_style import (
+    AXIS_COLOURS,
+    PALE_INK,
+    SIZE,
+    SMALL,
+    PictureSize,
+    label_in_unit,
+    new_figure,
+    style,
+)
 from porefv.packing.box import WALLS
 from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
@@ -20,6 +30,7 @@ from porefv.system.atomic_files import picture_target
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # Moments of which profiles are drawn.
 _MOMENTS = 6
@@ -78,7 +89,7 @@ def series_picture(
         for ax in in_time:
             _stages(ax, record)
             ax.set_xlim(series["time"][0], max(series["time"][-1], np.nextafter(series["time"][0], np.inf)))
-            ax.set_xlabel("time, s")
+            label_in_unit(ax.xaxis, "time", series["time"][-1], "s")
             ax.grid(alpha=0.3)
             ax.legend()
         if profiles is not None and len(profiles):
@@ -91,10 +102,16 @@ def series_picture(
     return figure
 
 
+def _most(lines: Iterable[Line2D]) -> float:
+    """The largest size of a value of curves; 0 if all are missing."""
+    sizes = [np.abs(np.asarray(line.get_ydata(), float)) for line in lines]
+    return max((float(np.nanmax(size)) for size in sizes if not np.isnan(size).all()), default=0.0)
+
+
 def _pressures(ax: Axes, series: np.ndarray) -> None:
     ax.plot(series["time"], series["mean_pressure"], label="mean")
     ax.plot(series["time"], series["max_pressure"], label="largest")
-    ax.set_ylabel("pressure of the pores, Pa")
+    label_in_unit(ax.yaxis, "pressure of the pores", _most(ax.lines), "Pa")
 
 
 def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
@@ -103,7 +120,7 @@ def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
         ax.plot(series["time"], series[f"contact_stress_{wall}"], label=wall, **style)
         if wet:
             ax.plot(series["time"], series[f"total_stress_{wall}"], lw=3.0, alpha=0.3, **style)
-    ax.set_ylabel("stress on walls, Pa" + (" (contacts; broad: total)" if wet else ""))
+    label_in_unit(ax.yaxis, "stress on walls", _most(ax.lines), "Pa", " (contacts; broad: total)" if wet else "")
 
 
 def _strains(ax: Axes, series: np.ndarray) -> None:
@@ -135,7 +152,8 @@ def _profiles(ax: Axes, profiles: np.ndarray, record: RunRecord, quantity: str) 
         layers = found[found["time"] == time]
         ax.plot(layers[quantity], 0.5 * (layers["lower"] + layers["upper"]), ".-", label=f"{time:.4g} s")
     stage = record.spans[int(found["stage"][0]) - 1].name
-    ax.set_xlabel(f"{quantity.replace('_', ' ')} by layer, Pa, in {stage}", parse_math=False)
-    ax.set_ylabel("place across the layers, m")
+    shown = f"{quantity.replace('_', ' ')} by layer"
+    label_in_unit(ax.xaxis, shown, np.nanmax(np.abs(found[quantity])), "Pa", f", in {stage}")
+    label_in_unit(ax.yaxis, "place across the layers", np.abs(found["upper"]).max(), "m")
     ax.grid(alpha=0.3)
     ax.legend()
