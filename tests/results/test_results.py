@@ -165,7 +165,7 @@ def test_meshes_carry_the_fields(flow, everything):
     np.testing.assert_array_equal(pores["volume"], mesh.pore_volumes[mesh.cell_pore])
     np.testing.assert_array_equal(pores["velocity"], flow.pore_velocity[mesh.cell_pore])
     np.testing.assert_array_equal(pores["pore"], mesh.cell_pore)
-    np.testing.assert_array_equal(everything.spheres["total_force"], flow.forces.total)
+    np.testing.assert_array_equal(everything.spheres["fluid_force"], flow.forces.total)
     np.testing.assert_array_equal(everything.spheres["radius"], mesh.packing.radii)
     network = everything.throats
     np.testing.assert_array_equal(network["flux"], flow.flux)

@@ -47,7 +47,7 @@ def flow_picture(
         As of `picture`.
     """
     pv = load_pyvista()
-    data = {"total_force": flow.forces.total} if forces else {}
+    data = {"fluid_force": flow.forces.total} if forces else {}
     spheres = pv.PolyData(spheres_polydata(flow.mesh.packing, **data))
     return picture(spheres, flow.mesh.to_pyvista(pressure=flow.pressure), walls=flow.walls, title=title, size=size)
 
@@ -66,7 +66,7 @@ def picture(
     Parameters
     ----------
     spheres : pyvista.PolyData
-        Centres with the point data `radius` and, to be coloured by its size, `total_force` [N].
+        Centres with the point data `radius` and, to be coloured by its size, `fluid_force` [N].
     pores : pyvista.UnstructuredGrid
         The mesh, with or without the cell data `pressure` [Pa].
     walls : Walls, optional
@@ -125,8 +125,8 @@ def _add_spheres(pv: Any, plotter: Any, spheres: Any, view: _View, opened: bool)
     points, radii = spheres.points, spheres["radius"]
     colours: dict[str, Any] = {"color": _GRAIN}
     values = np.zeros(len(radii))
-    if "total_force" in spheres.point_data:
-        values = np.linalg.norm(spheres["total_force"], axis=1)
+    if "fluid_force" in spheres.point_data:
+        values = np.linalg.norm(spheres["fluid_force"], axis=1)
         colours = {
             "scalars": "force", "cmap": _FORCES, "clim": [0.0, values.max() or 1.0],
             "scalar_bar_args": _bar("force on a grain [N]", 0, plotter),
