@@ -338,3 +338,14 @@ def test_numbers_need_no_vtk():
         "import porefv.results, porefv.scenes.flow_scene, porefv.cli.text\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_forces_in_files_of_earlier_versions_have_the_name_of_today(flow, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    written = results.write(flow, tmp_path / "results")
+    spheres = pyvista.read(written / "spheres.vtp")
+    forces = np.array(spheres["fluid_force"])
+    spheres.rename_array("fluid_force", "total_force", preference="point")
+    spheres.field_data.clear()
+    spheres.save(written / "spheres.vtp")
+    np.testing.assert_array_equal(results.read(written).spheres["fluid_force"], forces)
