@@ -52,7 +52,8 @@ def paraview():
     pvpython = shutil.which("pvpython")
     if pvpython is None:
         pytest.skip("ParaView is not installed: there is no pvpython")
-    # Without -noreset, Xvfb starts anew when a client leaves, and may refuse the next. Debian's ParaView needs a display even for pictures without a window.
+    # Debian's ParaView needs a display even for pictures without a window. Without -noreset, Xvfb starts anew when a
+    # client leaves, and may refuse the next.
     virtual = shutil.which("xvfb-run")
     if sys.platform == "linux" and "DISPLAY" not in os.environ and virtual is None:
         pytest.skip("ParaView needs a display here, or xvfb-run: there is neither")

@@ -128,7 +128,7 @@ class Trajectory:
             walls["fluid_force"] = np.zeros((6, 3)) if wall_fluid_forces is None else wall_fluid_forces
         outside = grains.get("fluid_force", dem.applied)
         grains["force"] = grains["contact_force"] + outside + dem.masses[:, None] * dem.gravity
-        walls["force"] = sum(walls.values())
+        walls["force"] = np.sum(list(walls.values()), axis=0)
         datasets = {"grains": _grains(dem, grains), "walls": _walls(dem, walls)}
         if self.contacts:
             datasets["contacts"] = _lines(dem, contacts)

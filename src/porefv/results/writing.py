@@ -18,7 +18,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,6 +47,9 @@ from porefv.results.summary import summary_json, tested_reliability
 from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
 
 # What `write` computes unless it is told.
 USUAL_QUANTITIES = ("permeability", "pressure", "forces")
@@ -260,7 +263,7 @@ def _write_vtk(
             # The names of the frames of `simulate`, where contacts press on grains, too.
             names = {part: "fluid_force" if part == "total" else f"{part}_force" for part in PARTS}
             spheres = {name: getattr(flow.forces, part) for part, name in names.items()}
-    datasets = {
+    datasets: dict[str, vtkUnstructuredGrid | vtkPolyData] = {
         "pores.vtu": cells_grid(mesh, **pores),
         "spheres.vtp": spheres_polydata(mesh.packing, **spheres),
         "throats.vtp": throats_polydata(mesh.throats, points, **throats),

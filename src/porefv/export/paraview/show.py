@@ -35,11 +35,13 @@ def show(results: str) -> Any:
         raise SystemExit(f"{results} has neither spheres.vtp nor frames/grains.pvd: ask for them in [output]")
     scene = pv.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
-    scene.GoToLast()
+    view = pv.GetActiveViewOrCreate("RenderView")
+    times = [time for source in (grains, pores, throats) if source is not None for time in _times(source)]
+    last = max(times, default=0.0)
+    scene.AnimationTime = last
     for source in (grains, pores, throats):
         if source is not None:
-            source.UpdatePipeline(scene.AnimationTime)  # the range of colours is that of the last time
-    view = pv.GetActiveViewOrCreate("RenderView")
+            source.UpdatePipeline(last)  # the ranges of colours are those of the last time
     view.ViewSize = [1200, 900]
     view.UseColorPaletteForBackground = 0
     view.Background = [1.0, 1.0, 1.0]
@@ -67,6 +69,11 @@ def _source(directory: str, name: str) -> Any:
     source = pv.OpenDataFile(path)
     pv.RenameSource(name, source)
     return source
+
+
+def _times(source: Any) -> list[float]:
+    """Times of the frames of a .pvd; none of a file."""
+    return list(source.TimestepValues) if hasattr(source, "TimestepValues") else []
 
 
 def _show_grains(view: Any, grains: Any, cut: bool, middle: list[float], size: list[float]) -> None:
