@@ -9,7 +9,7 @@ from typing import Any
 from porefv.cli.text import path_text, say
 
 # As `porefv.results.exporting.FORMATS`, which would be slow to import for the help.
-FORMATS = ("openpnm", "csv", "section", "paraview", "inp", "mesh", "msh", "nas", "vtk", "vtu")
+FORMATS = ("openpnm", "csv", "inp", "mesh", "msh", "nas", "vtk", "vtu")
 
 
 def register(commands: Any) -> None:
@@ -20,7 +20,7 @@ def register(commands: Any) -> None:
         help="results of porefv solve with vtk = true; for paraview also those of porefv simulate, with frames",
     )  # fmt: skip
     parser.add_argument(
-        "--to", choices=FORMATS, required=True,
+        "--to", choices=(*FORMATS, "section", "paraview"), required=True,
         help="openpnm: arrays in the names of OpenPNM, a .npz file; csv: pores.csv and throats.csv in a directory; "
         "section: grains and pores cut by a plane, a .vtp file; paraview: a script .py that shows the results there; "
         "others: the mesh of the pores, written by meshio",
