@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError
-from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata, write_paths
-from porefv.export.vtk_files import write_xml
+from porefv.export.vtk_datasets import cells_grid, flux_data, spheres_polydata, throats_polydata, write_paths
+from porefv.export.vtk_files import FORMAT_VERSION, attach_provenance, write_xml
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 from porefv.mesh.polyhedra import HEXAHEDRON, TETRA, WEDGE, polyhedra
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
+from porefv.system.version import __version__
 
 pyvista = pytest.importorskip("pyvista")
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
@@ -121,6 +122,8 @@ def test_network_has_a_point_per_pore_and_a_line_per_throat():
     throats = flow.mesh.throats
     network = pyvista.wrap(throats_polydata(throats, flux=flow.flux))
     assert network.n_points == flow.mesh.n_pores
+    np.testing.assert_array_equal(network["volume"], flow.mesh.pore_volumes)
+    np.testing.assert_array_equal(network["pore"], np.arange(flow.mesh.n_pores))
     np.testing.assert_array_equal(network.lines.reshape(-1, 3)[:, 1:], throats.pores)
     np.testing.assert_array_equal(network.cell_data["flux"], flow.flux)
     lines = np.diff(network.points[throats.pores], axis=1)[:, 0]
@@ -136,6 +139,29 @@ def test_spheres_carry_their_ids_and_radii():
     np.testing.assert_array_equal(points["id"], [0, 1])
     np.testing.assert_array_equal(points["weight"], [1.0, 2.0])
     assert points.n_verts == 2
+
+
+def test_fluxes_of_the_network_are_speeds_through_necks():
+    flow = PoreFlow(Packing.read(PACKINGS / "n200_s1.csv"), Walls.along("y"))
+    throats = flow.mesh.throats
+    data = flux_data(throats, flow.flux, flow.walls.slip)
+    areas = np.pi * data["neck_radius"] ** 2
+    np.testing.assert_allclose(areas[~throats.closed], throats.fluid_areas[~throats.closed])
+    np.testing.assert_allclose(data["speed"] * areas, np.where(throats.closed, 0.0, abs(flow.flux)))
+    np.testing.assert_array_equal(data["inscribed_radius"], throats.inscribed_radii(flow.walls.slip))
+
+
+@pytest.mark.parametrize("name", ["spheres.vtp", "pores.vtu"])
+def test_field_data_say_where_a_file_comes_from(tmp_path, name):
+    mesh = PoreMesh(two_spheres())
+    grid = cells_grid(mesh, pressure=np.ones(mesh.n_pores))
+    dataset = grid if name == "pores.vtu" else spheres_polydata(mesh.packing)
+    attach_provenance(dataset, {"scene": "bläh.toml", "viscosity": 2.0})
+    write_xml(dataset, tmp_path / name)
+    fields = pyvista.read(tmp_path / name).field_data
+    assert fields["scene"][0] == "bläh.toml" and fields["viscosity"][0] == 2.0
+    assert fields["format_version"][0] == FORMAT_VERSION and fields["porefv_version"][0] == __version__
+    assert list(fields["units"]) == (["pressure: Pa"] if name == "pores.vtu" else ["radius: m"])
 
 
 def test_files_are_binary_and_compressed(tmp_path):

@@ -165,7 +165,7 @@ def test_meshes_carry_the_fields(flow, everything):
     np.testing.assert_array_equal(pores["volume"], mesh.pore_volumes[mesh.cell_pore])
     np.testing.assert_array_equal(pores["velocity"], flow.pore_velocity[mesh.cell_pore])
     np.testing.assert_array_equal(pores["pore"], mesh.cell_pore)
-    np.testing.assert_array_equal(everything.spheres["total_force"], flow.forces.total)
+    np.testing.assert_array_equal(everything.spheres["fluid_force"], flow.forces.total)
     np.testing.assert_array_equal(everything.spheres["radius"], mesh.packing.radii)
     network = everything.throats
     np.testing.assert_array_equal(network["flux"], flow.flux)
@@ -338,3 +338,14 @@ def test_numbers_need_no_vtk():
         "import porefv.results, porefv.scenes.flow_scene, porefv.cli.text\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_forces_in_files_of_earlier_versions_have_the_name_of_today(flow, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    written = results.write(flow, tmp_path / "results")
+    spheres = pyvista.read(written / "spheres.vtp")
+    forces = np.array(spheres["fluid_force"])
+    spheres.rename_array("fluid_force", "total_force", preference="point")
+    spheres.field_data.clear()
+    spheres.save(written / "spheres.vtp")
+    np.testing.assert_array_equal(results.read(written).spheres["fluid_force"], forces)

@@ -446,12 +446,41 @@ def test_the_old_key_of_parquet_files_is_refused_with_the_new_one(path):
 def test_frames_are_taken_at_the_times_asked(path):
     pyvista = pytest.importorskip("pyvista")
     found = run(path, WET + "frames = [0.0, 0.03]\n") / "frames"
-    step = next(int(name.stem.split("_")[1]) for name in found.glob("pores_*.vtu"))
+    step = max(int(name.stem.split("_")[1]) for name in found.glob("pores_*.vtu"))
     assert sorted(name.name for name in found.glob("grains_*")) == ["grains_000000000.vtp", f"grains_{step:09d}.vtp"]
     pores = pyvista.read(found / f"pores_{step:09d}.vtu")
     assert pores["pressure"].max() > 0.0
-    times = [float(t) for t in re.findall(r'timestep="([^"]+)"', (found / "pores.pvd").read_text())]
-    assert times == pytest.approx([0.03], rel=1e-3)
+    for series in ("grains", "pores"):
+        times = [float(t) for t in re.findall(r'timestep="([^"]+)"', (found / f"{series}.pvd").read_text())]
+        assert times == pytest.approx([0.0, 0.03], rel=1e-3)
+    assert not (found / "throats.pvd").exists()
+
+
+def test_frames_name_their_fields_as_steady_results_do_and_say_where_they_come_from(path):
+    pyvista = pytest.importorskip("pyvista")
+    found = run(path, WET + "frames = [0.0, 0.03]\nvelocity = true\nthroats = true\n") / "frames"
+    first, last = (pyvista.read(name) for name in sorted(found.glob("pores_*.vtu")))
+    assert set(first.cell_data) == set(last.cell_data) == {"pore", "volume", "walls", "pressure", "velocity"}
+    assert np.isnan(first["pressure"]).all() and np.isfinite(last["velocity"]).all()
+    throats = pyvista.read(sorted(found.glob("throats_*.vtp"))[-1])
+    assert set(throats.point_data) == {"pore", "volume", "pressure"}
+    np.testing.assert_array_equal(throats["flux_magnitude"], abs(throats["flux"]))
+    assert throats["flux_magnitude"].max() > 0.0
+    grains = pyvista.read(sorted(found.glob("grains_*.vtp"))[-1])
+    assert abs(grains["fluid_force"]).max() > 0.0
+    for data in (last, throats, grains):
+        assert data.field_data["viscosity"][0] > 0.0
+        assert data.field_data["scene"][0] == str(path)
+        assert data.field_data["time"][0] == pytest.approx(0.03, rel=1e-3)
+
+
+def test_the_resultant_of_a_frame_is_contact_force_fluid_force_and_weight(path):
+    pyvista = pytest.importorskip("pyvista")
+    grains = pyvista.read(sorted((run(path, WET + "frames = [0.03]\n") / "frames").glob("grains_*.vtp"))[-1])
+    scene = SimulationScene.read(path)
+    weight = scene.grains().masses[:, None] * np.asarray(scene.gravity)
+    total = grains["contact_force"] + grains["fluid_force"] + weight
+    np.testing.assert_allclose(grains["force"], total, rtol=1e-9, atol=1e-12)
 
 
 # ---- bad scenes ----------

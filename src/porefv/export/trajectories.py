@@ -2,7 +2,7 @@
 
 A directory holds::
 
-    grains.pvd     frames grains_000012000.vtp: centres with radii, velocities, spins and resultant forces, and the box
+    grains.pvd     frames grains_000012000.vtp: centres with radii, velocities, spins and forces, and the box
     walls.pvd      frames walls_000012000.vtp: the six sides of the box with their velocities and forces
     contacts.pvd   frames contacts_000012000.vtp: a line per contact with its force
 
@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -26,7 +26,7 @@ from porefv.dem.dem import DEM
 from porefv.dem.measurements import Contacts
 from porefv.errors import InputError, counted
 from porefv.export.vtk_datasets import spheres_polydata
-from porefv.export.vtk_files import attach, cell_array, vtk_data_model, vtk_points, write_xml
+from porefv.export.vtk_files import attach, attach_provenance, cell_array, vtk_data_model, vtk_points, write_xml
 from porefv.system.atomic_files import atomic_write
 
 if TYPE_CHECKING:
@@ -95,8 +95,22 @@ class Trajectory:
         for series, step in self._stale:
             del self._frames[series][step]
 
-    def write(self) -> None:
+    def write(
+        self,
+        fluid_forces: np.ndarray | None = None,
+        wall_fluid_forces: np.ndarray | None = None,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> None:
         """Add a frame of the grains as they are now, in place of one of the same step.
+
+        Parameters
+        ----------
+        fluid_forces : (n, 3) array, optional
+            Force of a fluid on each grain, besides `dem.applied`. With them grains and walls have `fluid_force` [N].
+        wall_fluid_forces : (6, 3) array, optional
+            Of the fluid on each wall [N].
+        provenance : mapping, optional
+            Further field data of the files, see `attach_provenance`.
 
         Raises
         ------
@@ -105,11 +119,22 @@ class Trajectory:
         """
         dem = self.dem
         contacts = dem.contacts
-        forces = _resultants(dem, contacts)
-        datasets = {"grains": _grains(dem, forces[: len(dem)]), "walls": _walls(dem, forces[len(dem) :])}
+        n, of_contacts = len(dem), _contact_forces(dem, contacts)
+        grains = {"contact_force": of_contacts[:n]}
+        walls = {"contact_force": of_contacts[n:]}
+        if fluid_forces is not None:
+            # Buoyancy by the hydrostatic pressure, which the piezometric one leaves out, is what is applied.
+            grains["fluid_force"] = dem.applied + fluid_forces
+            walls["fluid_force"] = np.zeros((6, 3)) if wall_fluid_forces is None else wall_fluid_forces
+        outside = grains.get("fluid_force", dem.applied)
+        grains["force"] = grains["contact_force"] + outside + dem.masses[:, None] * dem.gravity
+        walls["force"] = np.sum(list(walls.values()), axis=0)
+        datasets = {"grains": _grains(dem, grains), "walls": _walls(dem, walls)}
         if self.contacts:
             datasets["contacts"] = _lines(dem, contacts)
         for series, dataset in datasets.items():
+            box = {"box_lower": dem.box.lower, "box_upper": dem.box.upper}
+            attach_provenance(dataset, {**box, "time": dem.time, **(provenance or {})})
             with atomic_write(self.directory / _name(series, dem.steps)) as temporary:
                 write_xml(dataset, temporary)
             self._frames[series][dem.steps] = dem.time
@@ -137,25 +162,23 @@ class Trajectory:
 # ---- frames ------------------------------------------------------------------------------------------------
 
 
-def _resultants(dem: DEM, contacts: Contacts) -> np.ndarray:
-    """(n + 6, 3): contact forces, weight and forces from outside on each grain; then forces on each wall [N]."""
+def _contact_forces(dem: DEM, contacts: Contacts) -> np.ndarray:
+    """(n + 6, 3): contact forces on each grain, then on each wall [N]."""
     i, j = contacts.grains.T
     n = len(dem)
     total = np.zeros((n + 6, 3))
     np.add.at(total, i, contacts.forces)
     np.subtract.at(total, j, contacts.forces)
-    total[:n] += dem.applied + dem.masses[:, None] * dem.gravity
     return total
 
 
-def _grains(dem: DEM, forces: np.ndarray) -> vtkPolyData:
+def _grains(dem: DEM, forces: dict[str, np.ndarray]) -> vtkPolyData:
+    return spheres_polydata(dem.packing, velocity=dem.velocities, spin=dem.spins, **forces)
 
-    return spheres_polydata(dem.packing, velocity=dem.velocities, spin=dem.spins, force=forces)
 
-
-def _walls(dem: DEM, forces: np.ndarray) -> vtkPolyData:
+def _walls(dem: DEM, forces: dict[str, np.ndarray]) -> vtkPolyData:
     corners = np.array([[dem.places[2 * axis + (k >> axis & 1)] for axis in range(3)] for k in range(8)])
-    return _polydata(corners, {"wall": np.arange(6), "velocity": dem.wall_velocities, "force": forces}, polygons=_SIDES)
+    return _polydata(corners, {"wall": np.arange(6), "velocity": dem.wall_velocities, **forces}, polygons=_SIDES)
 
 
 def _lines(dem: DEM, contacts: Contacts) -> vtkPolyData:

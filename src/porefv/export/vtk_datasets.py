@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -77,14 +78,20 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     return polydata
 
 
-def throats_polydata(throats: Throats, **cell_data: np.ndarray) -> vtkPolyData:
+def throats_polydata(
+    throats: Throats, point_data: Mapping[str, np.ndarray] | None = None, **cell_data: np.ndarray
+) -> vtkPolyData:
     """The network: a point per pore, a line per throat with the cell data given (t rows).
 
-    Points are Laguerre vertices, that of a united pore the mean of several.
+    Points are Laguerre vertices, that of a united pore the mean of several. They have the point data `pore` (id),
+    `volume` and those given (n_pores rows).
     """
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(throats.mesh.pore_centres))
     polydata.SetLines(cell_array(throats.pores))
+    mesh = throats.mesh
+    data = {"pore": np.arange(mesh.n_pores), "volume": mesh.pore_volumes, **(point_data or {})}
+    attach(polydata.GetPointData(), data, mesh.n_pores)
     attach(polydata.GetCellData(), cell_data, len(throats))
     return polydata
 
@@ -124,3 +131,32 @@ def write_paths(paths: Paths, path: str | PathLike[str]) -> None:
     dataset = paths_polydata(paths)
     with locked(path), atomic_write(path) as temporary:
         write_xml(dataset, temporary)
+
+
+def flux_data(throats: Throats, flux: np.ndarray, slip: np.ndarray) -> dict[str, np.ndarray]:
+    """Cell data of the network that show a flow.
+
+    Parameters
+    ----------
+    throats : Throats
+    flux : (t,) array
+        From the first pore of each throat to its second [m³/s].
+    slip : (6,) bool array
+        Walls with slip.
+
+    Returns
+    -------
+    dict of str to (t,) array
+        `flux` and `flux_magnitude` [m³/s]; `speed`, the size of the mean velocity in the neck [m/s], zero where no
+        section is open; `neck_radius`, of the circle with the fluid's cross-section, and `inscribed_radius`, of the
+        largest circle in the neck [m].
+    """
+    areas = np.where(throats.closed, 0.0, throats.fluid_areas)
+    size = np.abs(flux)
+    return {
+        "flux": flux,
+        "flux_magnitude": size,
+        "speed": np.divide(size, areas, out=np.zeros(len(throats)), where=areas > 0.0),
+        "neck_radius": np.sqrt(areas / np.pi),
+        "inscribed_radius": throats.inscribed_radii(slip),
+    }

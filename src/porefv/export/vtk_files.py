@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from porefv.errors import InputError
+from porefv.errors import InputError, printable
 from porefv.system.optional_imports import load
+from porefv.system.version import __version__
 
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
+
+# Of the names and fields of the files: 1 had no field data but the box.
+FORMAT_VERSION = 2
+UNITS = {
+    "radius": "m", "length": "m", "hydraulic_radius": "m", "neck_radius": "m", "inscribed_radius": "m",
+    "area": "m2", "fluid_area": "m2", "volume": "m3", "pressure": "Pa", "velocity": "m/s", "speed": "m/s",
+    "spin": "rad/s", "flux": "m3/s", "flux_magnitude": "m3/s", "conductance": "m3/(Pa s)",
+    "fluid_force": "N", "pressure_force": "N", "viscous_force": "N", "buoyancy_force": "N",
+    "contact_force": "N", "force": "N", "normal_force": "N",
+}  # fmt: skip
 
 
 def vtk_data_model() -> Any:
@@ -64,6 +75,26 @@ def _silence() -> Iterator[None]:
     finally:
         window.SetInstance(before)
         core.vtkLogger.SetStderrVerbosity(verbosity)
+
+
+def attach_provenance(dataset: vtkUnstructuredGrid | vtkPolyData, provenance: Mapping[str, Any]) -> None:
+    """Add field data that say where a dataset comes from: text, numbers or vectors by name, and `units` of all arrays.
+
+    `units` is a text for each array of points and cells that has a unit, such as ``pressure: Pa``.
+    """
+    attributes = (dataset.GetPointData(), dataset.GetCellData())
+    names = {data.GetArrayName(k) for data in attributes for k in range(data.GetNumberOfArrays())}
+    units = [f"{name}: {UNITS[name]}" for name in sorted(names & set(UNITS))]
+    fields = {"format_version": FORMAT_VERSION, "porefv_version": __version__, **provenance, "units": units}
+    for name, values in fields.items():
+        if isinstance(values, str | list):
+            array = _vtk("vtkCommonCore").vtkStringArray()
+            for text in [values] if isinstance(values, str) else values:
+                array.InsertNextValue(printable(text))
+        else:
+            array = vtk_array(np.atleast_1d(np.asarray(values)))
+        array.SetName(name)
+        dataset.GetFieldData().AddArray(array)
 
 
 def vtk_array(values: np.ndarray) -> Any:

@@ -63,7 +63,7 @@ def formats_of(what: str) -> tuple[str, ...]:
 
 def default_kind(results: Results) -> str:
     """The picture that shows most of the results."""
-    if "total_force" in results.spheres.point_data:
+    if "fluid_force" in results.spheres.point_data:
         return "forces"
     return "pressure" if "pressure" in results.pores.cell_data else "packing"
 
@@ -108,7 +108,7 @@ def _data(results: Results, what: str) -> PictureData:
         "network": lambda: _network(results.throats),
         "pressure": lambda: _by_pore(pores, "pressure"),
         "velocity": lambda: _by_pore(pores, "velocity"),
-        "force": lambda: spheres.point_data.get("total_force"),
+        "force": lambda: spheres.point_data.get("fluid_force"),
         "flux": lambda: results.throats.cell_data.get("flux"),
     }
     data = PictureData(

@@ -98,8 +98,11 @@ class Results:
 
     @cached_property
     def spheres(self) -> pyvista.PolyData:
-        """The points of spheres.vtp."""
-        return self._read_vtk("spheres.vtp")
+        """The points of spheres.vtp; `fluid_force` has this name in files of porefv 0.2.0 and before, too."""
+        spheres = self._read_vtk("spheres.vtp")
+        if "total_force" in spheres.point_data:
+            spheres.rename_array("total_force", "fluid_force", preference="point")
+        return spheres
 
     @cached_property
     def throats(self) -> pyvista.PolyData:

@@ -18,10 +18,11 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from porefv.errors import InputError, OutOfRangeWarning
-from porefv.export.vtk_datasets import cells_grid, spheres_polydata, throats_polydata
-from porefv.export.vtk_files import vtk_data_model, write_xml
+from porefv.export.vtk_datasets import cells_grid, flux_data, spheres_polydata, throats_polydata
+from porefv.export.vtk_files import attach_provenance, vtk_data_model, write_xml
 from porefv.flow.directional_permeabilities import (
     DirectionalPermeabilities,
     directional_permeabilities,
@@ -45,6 +46,9 @@ from porefv.results.summary import summary_json, tested_reliability
 from porefv.system.atomic_files import atomic_directory, check_is_no_root
 from porefv.system.progress import Progress
 from porefv.system.tables import check_table_format
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
 
 # What `write` computes unless it is told.
 USUAL_QUANTITIES = ("permeability", "pressure", "forces")
@@ -217,7 +221,7 @@ def save(
             write_forces(flow, folder / FORCE_FILES[table_format])
         write_tables(tables, folder)
         if vtk:
-            _write_vtk(folder, mesh, flow, quantities)
+            _write_vtk(folder, mesh, flow, quantities, scene)
     reliability = None if flow is None else tested_reliability(flow)
     if reliability is not None and (said := reliability.warning):
         warnings.warn(said, OutOfRangeWarning, stacklevel=2)
@@ -232,23 +236,36 @@ def save(
     (folder / "summary.json").write_text(text, encoding="utf-8")
 
 
-def _write_vtk(folder: Path, mesh: PoreMesh, flow: PoreFlow | None, quantities: Collection[str]) -> None:
+def _write_vtk(
+    folder: Path, mesh: PoreMesh, flow: PoreFlow | None, quantities: Collection[str], scene: str | None
+) -> None:
     pores = {"volume": mesh.pore_volumes, "walls": mesh.pore_walls}
     throats = {
         "length": mesh.throats.lengths,
         "area": mesh.throats.areas,
         "fluid_area": mesh.throats.fluid_areas,
     }
-    spheres = {}
+    spheres, points = {}, {}
+    provenance: dict[str, Any] = {"box_lower": mesh.box.lower, "box_upper": mesh.box.upper}
+    if scene is not None:
+        provenance["scene"] = scene
     if flow is not None:
         throats["hydraulic_radius"] = mesh.throats.hydraulic_radii(flow.walls.slip)
         throats["conductance"] = flow.conductances
-        throats["flux"] = flow.flux
+        throats |= flux_data(mesh.throats, flow.flux, flow.walls.slip)
+        provenance["viscosity"] = flow.fluid.viscosity
         if "pressure" in quantities:
-            pores["pressure"] = flow.pressure
+            pores["pressure"] = points["pressure"] = flow.pressure
             pores["velocity"] = flow.pore_velocity
         if "forces" in quantities:
-            spheres = {f"{part}_force": getattr(flow.forces, part) for part in PARTS}
-    write_xml(cells_grid(mesh, **pores), folder / "pores.vtu")
-    write_xml(spheres_polydata(mesh.packing, **spheres), folder / "spheres.vtp")
-    write_xml(throats_polydata(mesh.throats, **throats), folder / "throats.vtp")
+            # The names of the frames of `simulate`, where contacts press on grains, too.
+            names = {part: "fluid_force" if part == "total" else f"{part}_force" for part in PARTS}
+            spheres = {name: getattr(flow.forces, part) for part, name in names.items()}
+    datasets: dict[str, vtkUnstructuredGrid | vtkPolyData] = {
+        "pores.vtu": cells_grid(mesh, **pores),
+        "spheres.vtp": spheres_polydata(mesh.packing, **spheres),
+        "throats.vtp": throats_polydata(mesh.throats, points, **throats),
+    }
+    for name, dataset in datasets.items():
+        attach_provenance(dataset, provenance)
+        write_xml(dataset, folder / name)

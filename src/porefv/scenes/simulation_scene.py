@@ -94,6 +94,8 @@ class SimulationOutput(Table):
     axis: Annotated[str, Choice(AXES)] = key("axis across the layers, and of the permeameter", "z")
     frames: Moments | None = key("interval between frames for ParaView, or a list of times", None, unit="s")
     contacts: bool = key("whether frames have the contacts, too", False)
+    velocity: bool = key("whether frames have the velocity in the pores, too", False)
+    throats: bool = key("whether frames have the throats, with their fluxes, too", False)
     table_format: Annotated[str, Choice(TABLE_FORMATS)] = key(
         'format of the series and profiles when the run is complete: `"npy"` (NumPy) or `"parquet"`, which needs '
         "pyarrow, beside the CSV files, which grow with the run",

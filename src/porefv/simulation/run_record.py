@@ -31,7 +31,7 @@ STARTING, RUNNING = "starting", "running"
 STATUSES = (STARTING, RUNNING, "interrupted", "failed", "complete")
 
 _CHECKPOINT = re.compile(r"checkpoint_\d+\.npz")
-_FRAME = re.compile(r"(grains|walls|contacts|pores)(\.pvd|_\d+\.vt[pu])")
+_FRAME = re.compile(r"(grains|walls|contacts|pores|throats)(\.pvd|_\d+\.vt[pu])")
 
 
 @dataclass

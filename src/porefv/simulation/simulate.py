@@ -23,7 +23,7 @@ from porefv.packing.packing import Packing
 from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScene
 from porefv.scenes.stage import Rest, Stage
 from porefv.simulation import measurements
-from porefv.simulation.frames import Frames
+from porefv.simulation.frames import FrameContent, Frames
 from porefv.simulation.run_record import (
     FRAMES,
     RUNNING,
@@ -244,7 +244,8 @@ class _Run:
             self._profiles = Series(self.directory / PROFILES, measurements.PROFILE_COLUMNS, series.get(PROFILES))
         self._frames: Frames | None = None
         if output.frames is not None:
-            self._frames = Frames(self.directory / FRAMES, dem, output.contacts, point.frames if point else {})
+            content = FrameContent(output.contacts, output.velocity, output.throats, scene.fluid, record.path)
+            self._frames = Frames(self.directory / FRAMES, dem, content, point.frames if point else {})
         if point is None:
             record.status = RUNNING
             record.write(self.directory)
@@ -394,7 +395,7 @@ class _Run:
             for layer in measurements.profile_rows(dem, coupling, self._axis, self.scene.output.layers):
                 self._profiles.add(layer | {"stage": k + 1})
         if self._frames is not None and self._frame_times.due(dem.steps, ended):
-            self._frames.write(dem, coupling)
+            self._frames.write(dem, coupling, self._walls.at(dem.time).slip)
 
     def _measure_permeability(self, k: int, when: str) -> None:
         found = measurements.permeability(
