@@ -40,3 +40,31 @@ def test_forces_from_a_packing_file_to_a_picture(tmp_path):
     assert ratio == pytest.approx(1.0, abs=0.05)
     assert strongest == 12
     assert (tmp_path / "tutorials" / "forces.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_pressure_equation_three_ways(tmp_path):
+    in_fipy, exact, of_porefv, settled, forces, permeability = run(
+        "pressure_three_ways.ipynb", tmp_path,
+        "float(np.abs(in_fipy - by_hand).max() / drop)", "float(np.abs(exact - by_hand).max() / drop)",
+        "float(np.abs(flow.pressure - by_hand).max() / drop)", "float(settled)", "float(forces)",
+        "[k_by_hand, flow.permeability]",
+    )  # fmt: skip
+    assert in_fipy < 1e-7
+    assert exact < 1e-11
+    assert of_porefv < 1e-11
+    assert settled < 1e-7
+    assert forces < 1e-6
+    assert permeability[0] == pytest.approx(permeability[1], rel=1e-9)
+
+
+def test_a_solute_and_how_long_the_fluid_stays(tmp_path):
+    by_steps, by_age, imbalance, difference, left = run(
+        "solute.ipynb", tmp_path,
+        "by_steps / tau", "float(np.nanmean([residence_time(flow).mean / tau]))", "tracer.balance.largest_imbalance",
+        "float(difference)", "left",
+    )  # fmt: skip
+    assert by_steps == pytest.approx(1.0, abs=1e-6)
+    assert by_age == pytest.approx(1.0, abs=1e-10)
+    assert imbalance < 1e-14
+    assert difference < 1e-9
+    assert left == sorted(left, reverse=True)
