@@ -16,6 +16,7 @@ from porefv.flow.regions import Sphere
 from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.packing import Packing
+from porefv.transport import implicit
 from porefv.transport.solute import Solute
 
 
@@ -64,6 +65,41 @@ def test_steps_are_those_of_the_matrix_assembled_by_hand(small, peclet):
         c = spsolve(matrix, volumes / dt * c + supply)
         solute.advance(dt)
         assert_allclose(solute.concentration, c, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("peclet", [100.0, 1.0, 0.01])
+def test_iterations_for_many_pores_find_the_same(small, peclet, monkeypatch):
+    diffusivity, dt = strength(small, peclet), 0.02 * residence(small)
+    direct = Solute(small, diffusivity)
+    direct.advance(dt, 5)
+    steady = direct.steady()
+    monkeypatch.setattr(implicit, "FACTOR_LIMIT", 0)
+    solute = Solute(small, diffusivity)
+    solute.advance(dt, 5)
+    assert_allclose(solute.concentration, direct.concentration, rtol=0.0, atol=1e-10)
+    assert_allclose(solute.steady(), steady, rtol=0.0, atol=1e-9)
+    assert solute.balance.largest_imbalance < 1e-12
+
+
+@pytest.mark.parametrize("peclet", [np.inf, 100.0, 1.0])
+def test_fipy_finds_the_same(small, peclet):
+    fipy = pytest.importorskip("fipy")
+    diffusivity, dt = strength(small, peclet), 0.02 * residence(small)
+    solute = Solute(small, diffusivity)
+    solute.advance(dt, 10)
+    fluid = small.to_fipy()
+    c = fipy.CellVariable(mesh=fluid.mesh, hasOld=True)
+    c.constrain(1.0, where=fluid.inlet)
+    c.faceGrad.constrain(np.zeros((3, 1)), where=fluid.outlet)
+    inward = fipy.FaceVariable(mesh=fluid.mesh, value=diffusivity)
+    inward.setValue(0.0, where=fluid.mesh.exteriorFaces)
+    spread = fipy.DiffusionTerm(coeff=inward) if diffusivity else 0.0
+    equation = fipy.TransientTerm() + fipy.UpwindConvectionTerm(coeff=fluid.velocity) == spread
+    with np.errstate(all="ignore"):
+        for _ in range(10):
+            c.updateOld()
+            equation.solve(var=c, dt=dt)
+    assert_allclose(c.value, solute.concentration, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("peclet", [np.inf, 100.0, 10.0])

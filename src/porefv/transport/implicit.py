@@ -10,15 +10,21 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from porefv.errors import ComputationError
+from porefv.solvers.approximate_cholesky import ApproximateCholesky
+from porefv.solvers.network import Network
 from porefv.transport.flow_order import Upstream, sweep
-from porefv.transport.incomplete_factor import Rows, bicgstab, factored, rows_of
+from porefv.transport.incomplete_factor import Rows, bicgstab, factored, rows_of, solve_factors
 
 # Up to so many pores the matrix is factored; beyond, BiCGStab with an incomplete factor costs less.
 FACTOR_LIMIT = 20_000
 TOLERANCE = 5e-15
+TOLERANCE_OF_MANY = 1e-13  # beyond FACTOR_LIMIT
 # Iterations of one correction. What it may leave of the imbalance is not asked to be smaller than this part: the
 # residual is computed anew for the next.
 _ITERATIONS = 200
+# Where the factor in the order of the flow takes more iterations than these, diffusion is strong, and the approximate
+# Cholesky factor of the symmetric part takes fewer (benchmarks/transport.py).
+_MANY = 12
 _LEAST_PART = 1e-9
 _CORRECTIONS = 20
 _EPSILON = float(np.finfo(float).eps)
@@ -44,6 +50,7 @@ class Implicit:
     ):
         self._upstream, self._pairs, self._diffusion, self._tolerance = upstream, pairs, diffusion, tolerance
         self._diagonal = diagonal
+        self._diffusive = False
 
     def solve(self, rhs: np.ndarray, guess: np.ndarray) -> np.ndarray:
         """c (n,) of the right-hand side (n,).
@@ -57,7 +64,8 @@ class Implicit:
             found = np.empty(len(rhs))
             sweep(self._upstream, self._diagonal, rhs, found)
             return found
-        allowed = self._tolerance * float(np.abs(rhs).sum())
+        tolerance = max(self._tolerance, TOLERANCE_OF_MANY if len(rhs) > FACTOR_LIMIT else 0.0)
+        allowed = tolerance * float(np.abs(rhs).sum())
         x, lost, before = guess, np.inf, np.inf
         for _ in range(_CORRECTIONS):
             r = rhs - self._matrix @ x
@@ -80,8 +88,26 @@ class Implicit:
         order = self._upstream.order
         part = max(0.3 * allowed / float(np.abs(r).sum()), _LEAST_PART)
         found = np.empty(len(r))
-        found[order] = bicgstab(self._rows, self._incomplete, r[order], part, _ITERATIONS)[0]
+        inverse = self._symmetric.apply if self._diffusive else self._in_order_of_flow
+        found[order], iterations = bicgstab(self._rows, inverse, r[order], part, _ITERATIONS)
+        self._diffusive = self._diffusive or iterations > _MANY
         return found
+
+    def _in_order_of_flow(self, b: np.ndarray, x: np.ndarray) -> None:
+        solve_factors(self._incomplete, b, x)
+
+    @cached_property
+    def _symmetric(self) -> ApproximateCholesky:
+        """The factor of (A + Aᵀ) / 2, in the order of the flow."""
+        n, up = len(self._diagonal), self._upstream
+        number = np.empty(n, np.int32)
+        number[up.order] = np.arange(n, dtype=np.int32)
+        fed = np.repeat(np.arange(n), np.diff(up.starts))
+        carried, half = np.stack([fed, up.pores], axis=1), 0.5 * up.fluxes
+        leaks = self._diagonal - np.bincount(fed, half, n) - np.bincount(up.pores, half, n)
+        pairs = np.concatenate([number[self._pairs], number[carried]])
+        weights = np.concatenate([self._diffusion, half])
+        return ApproximateCholesky.of(Network.from_links(pairs, weights, np.maximum(leaks, 0.0)[up.order]))
 
     @cached_property
     def _matrix(self) -> Any:

@@ -6,6 +6,7 @@ exact. It is exact for pairs of pores that a short throat ties together, which s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,10 +97,13 @@ def multiply(rows, x, out):
         out[i] = total
 
 
-def bicgstab(rows: Rows, factors: Rows, r: np.ndarray, part: float, limit: int) -> tuple[np.ndarray, int]:
+def bicgstab(
+    rows: Rows, inverse: Callable[[np.ndarray, np.ndarray], object], r: np.ndarray, part: float, limit: int
+) -> tuple[np.ndarray, int]:
     """x (n,) with |r - A x|₂ below a part of |r|₂, or the best that was found, and the number of iterations.
 
-    Preconditioned from the right (van der Vorst 1992): the residual is that of A.
+    Preconditioned from the right (van der Vorst 1992): the residual is that of A. inverse(b, x) fills in x with what is
+    nearly A⁻¹ b.
     """
     n = len(r)
     x, shadow, p = np.zeros(n), r.copy(), r.copy()
@@ -109,12 +113,12 @@ def bicgstab(rows: Rows, factors: Rows, r: np.ndarray, part: float, limit: int) 
     rho = _dot(shadow, residual)
     v, t, ahead, side = np.empty((4, n))
     for iteration in range(1, limit + 1):
-        solve_factors(factors, p, ahead)
+        inverse(p, ahead)
         multiply(rows, ahead, v)
         alpha = rho / _dot(shadow, v)
         residual -= alpha * v
         x += alpha * ahead
-        solve_factors(factors, residual, side)
+        inverse(residual, side)
         multiply(rows, side, t)
         omega = _dot(t, residual) / _dot(t, t)
         x += omega * side
