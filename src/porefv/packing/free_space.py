@@ -20,7 +20,7 @@ FITS = ("fit", "bed")
 
 # Gap to the nearest grain, over the mean radius, and porosity of the layer along a wall above that of the inside, from
 # which on a wall has free space. Walls of packings by growth and settling have gaps of 0.01 and 0.15 more porosity.
-_GAP, _MORE = 0.05, 0.25
+_GAP, _MORE = 0.02, 0.25
 # A gap, over the mean radius, from which on a wall is moved to the grains for a bed.
 _FREE = 0.5
 
@@ -53,7 +53,7 @@ class WallLayer:
 def wall_layers(packing: Packing) -> tuple[WallLayer, ...]:
     """The layers along the six walls, in the order of `porefv.WALLS`.
 
-    A wall has free space if the nearest sphere is further away, by 0.05 mean radii, than half the median distance
+    A wall has free space if the nearest sphere is further away, by 0.02 mean radii, than half the median distance
     between the surfaces of nearest spheres, or if its layer is more porous by 0.25 than the inside.
 
     Raises
