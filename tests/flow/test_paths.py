@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -85,6 +85,7 @@ def test_lengths_are_those_of_the_lines_and_no_shorter_than_the_height(mesh_of, 
 @given(st.integers(0, 10_000))
 def test_pieces_that_pass_a_grain_are_counted_in_any_packing(random_packing, unit_flow, seed):
     flow = unit_flow(random_packing(15, ratio=0.1, seed=seed), Walls.along("z", slip=True))
+    assume(flow.mesh.pore_volumes.min() > 0.0)  # a large sphere may reach through a flat cell
     paths = flow.paths(50, seed=seed)
     assert (deepest(flow.mesh.packing, *pieces(paths)) > 1e-9) == (paths.cut > 0)
     assert paths.cut == 0  # no sphere overlaps another

@@ -177,7 +177,7 @@ def test_the_terminal_shows_stress_porosity_and_unbalanced_force(monkeypatch):
     progress = Progress(("packing", "writing"), quiet=True)
     progress.draws = True
     scene.make(progress)
-    assert re.fullmatch(r"pressing \S+ Pa, n 0\.\d{4}, unbalanced \S+", shown[-1])
+    assert re.fullmatch(r"n 0\.\d{4}  unbalanced \S+  \S+ Pa  pressing", shown[-1])
     assert len(shown[-1]) < 50
 
 

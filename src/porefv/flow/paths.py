@@ -239,7 +239,9 @@ def _assemble(flow: PoreFlow, entries: np.ndarray, visits: _Visits, stays: np.nd
     visited, taken, number, place, before = visits
     if (stays[visited] < 0.0).any():
         pore = int(visited[np.argmax(stays[visited] < 0.0)])
-        raise ComputationError(f"pore {pore} has a void volume below zero, as spheres overlap: no residence time")
+        raise ComputationError(
+            f"pore {pore} has a void volume below zero, as spheres overlap, or reach through flat cells: no residence time"
+        )
     t = len(mesh.throats)
     came = np.empty(len(taken), int)
     came[1:] = taken[:-1]
