@@ -30,11 +30,14 @@ class LengthUnit:
         None: the size of the unit is not known.
     place : str
         Where it is stated, as the start of an error: ``a.dump, line 2``.
+    clear : bool
+        False: `name` is a line that names a unit or a scale, and is not understood.
     """
 
     name: str
     metres: float | None
     place: str
+    clear: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +98,11 @@ class FileContent:
         """Length of the file's unit in m, and what is to be noted about it."""
         unit = self.unit
         if options.scale is None:
+            if unit is not None and not unit.clear:
+                raise InputError(
+                    f"{unit.place}: {quoted(unit.name)} names a unit or a scale of lengths, and is not understood. Give "
+                    "the length of the unit of the file in m as scale (1 if it is the metre)."
+                )
             if unit is not None and unit.metres is None:
                 raise InputError(
                     f"{unit.place}: lengths are in {quoted(unit.name)}, and how long that is in m is not known. "
