@@ -21,6 +21,7 @@ def register(commands: Any) -> None:
         "--what", choices=("profile", "pore_sizes", "constriction_sizes"),
         help="draw this quantity of solve in place of the grains and pores",
     )  # fmt: skip
+    parser.add_argument("--force", action="store_true", help="replace a picture that exists")
     parser.set_defaults(command=run)
 
 
@@ -29,6 +30,8 @@ def run(options: argparse.Namespace) -> None:
     from porefv.simulation.run_record import is_simulation
     from porefv.system.progress import Progress
 
+    if options.out.exists() and not options.force:
+        raise InputError(f"{options.out} exists already: choose another with --out, or add --force")
     with Progress().stage("drawing"):
         if is_packing_file(options.results):
             if options.what:

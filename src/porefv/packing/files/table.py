@@ -181,6 +181,7 @@ def _with_row_names(header: _Header, row: str, cells: int) -> _Header:
 def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
     """The names in a line, for each delimiter that the line has; units in brackets belong to the name before them."""
     text = re.sub(r"^\s*(?:[%!]|//|;\s)\s*", "", text)  # marks of comments in other programs
+    text = re.sub(r"^(?:columns|fields)\s*:\s*", "", text, flags=re.IGNORECASE)
     for mark in _DELIMITERS:
         if mark is None:
             yield mark, _BETWEEN_BLANKS.findall(text)

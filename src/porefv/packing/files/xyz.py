@@ -33,9 +33,7 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     starts, sizes, notes = _frames(path, lines)
     chosen = chosen_frame(path, len(starts), options)
     start, size = starts[chosen], sizes[chosen]
-    keys = {
-        match[1].lower(): match[2] or match[3] or match[4] or "" for match in _KEYS.finditer(lines[start + 1])
-    }
+    keys = {match[1].lower(): match[2] or match[3] or match[4] or "" for match in _KEYS.finditer(lines[start + 1])}
     others = _KEYS.sub(" ", lines[start + 1]).strip()
     place = f"{path}, line {start + 2}"
     names = _names(place, keys, lines[start + 2])
