@@ -112,7 +112,7 @@ def _warnings_in_a_line(quiet: bool) -> Iterator[None]:
     """Say warnings as errors are said, each once, or not at all."""
     said: set[str] = set()
 
-    def show(message: Warning | str, *_: Any) -> None:
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
         # Where a packing is validated twice, the same is found twice.
         if not quiet and str(message) not in said:
             said.add(str(message))

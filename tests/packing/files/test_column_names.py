@@ -61,8 +61,8 @@ def test_a_unit_at_the_end_of_a_header_is_not_dropped(read, ending):
 @pytest.mark.parametrize(
     "comment",
     [
-        "columns: x y z diameter and so on", "Columns are X, Y, Z and diameter", "x(1) y(2) z(3) d(4)", "1:x 2:y 3:z 4:diameter",
-        "radius, then x y z", "column 4 is the diameter", "xyzd of each",
+        "columns: x y z diameter and so on", "Columns are X, Y, Z and diameter", "x(1) y(2) z(3) d(4)",
+        "1:x 2:y 3:z 4:diameter", "radius, then x y z", "column 4 is the diameter", "xyzd of each",
     ],
 )  # fmt: skip
 def test_a_comment_that_names_other_columns_is_not_dropped(read, comment):

@@ -89,8 +89,8 @@ class FileContent:
         if options.radius is not None:
             notes = (*notes, f"radius of all spheres {options.radius:.9g} m, given")
         reading = Reading(
-            self.format, self.unit.name if self.unit else "", scale, dict(self.columns), self.frame, self.frames,
-            self.periodicity, place, (*self.notes, *notes),
+            self.format, self.unit.name if self.unit and self.unit.clear else "", scale, dict(self.columns), self.frame,
+            self.frames, self.periodicity, place, (*self.notes, *notes),
         )  # fmt: skip
         return Packing(centres, radii, box, Source(path, self.lines, reading), dict(self.metadata))
 
@@ -100,8 +100,8 @@ class FileContent:
         if options.scale is None:
             if unit is not None and not unit.clear:
                 raise InputError(
-                    f"{unit.place}: {quoted(unit.name)} names a unit or a scale of lengths, and is not understood. Give "
-                    "the length of the unit of the file in m as scale (1 if it is the metre)."
+                    f"{unit.place}: {quoted(unit.name)} names a unit or a scale of lengths, and is not understood. "
+                    "Give the length of the unit of the file in m as scale (1 if it is the metre)."
                 )
             if unit is not None and unit.metres is None:
                 raise InputError(

@@ -200,8 +200,8 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
             values[:, k] = corners[0][axis] + values[:, k] * (corners[1] - corners[0])[axis]
     centres, radii, unit, shown = spheres(f"{path}, line {start + 1}", columns, values, options)
     return FileContent(
-        "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", agreed_unit(unit, frame.unit, options), numbers, shown, chosen, len(frames),
-        said, notes,
+        "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", agreed_unit(unit, frame.unit, options), numbers, shown,
+        chosen, len(frames), said, notes,
     )  # fmt: skip
 
 

@@ -10,23 +10,26 @@ from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import quoted
 
 _PREFIXES = {"": 1.0, "deci": 1e-1, "centi": 1e-2, "milli": 1e-3, "micro": 1e-6, "nano": 1e-9, "kilo": 1e3}
+_IN_FULL = {f"{prefix}{word}": size for prefix, size in _PREFIXES.items() for word in ("metre", "meter")}
 
 # Metres in units of length that files state.
 UNITS = {
     "m": 1.0, "dm": 1e-1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "micron": 1e-6, "microns": 1e-6,
     "nm": 1e-9, "km": 1e3, "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048,
     "feet": 0.3048, "å": 1e-10, "angstrom": 1e-10, "angstroms": 1e-10, "ångström": 1e-10,
-} | {f"{prefix}{word}": size for prefix, size in _PREFIXES.items() for word in ("metre", "meter", "metres", "meters")}  # fmt: skip
+    **_IN_FULL, **{f"{word}s": size for word, size in _IN_FULL.items()},
+}  # fmt: skip
 
 # Systems of units, by the size of their unit of length in m.
 _SYSTEMS = {"si": 1.0, "mks": 1.0, "cgs": 1e-2}
 
 # Words beside a unit that change nothing about it, and units of other things than length, all in lower case.
-_BESIDE = set(
-    "unit units of length lengths distance distances dimension dimensions all are is in the given expressed measured "
-    "and file system kg g mg t tonne s ms sec seconds min h n kn mn pa kpa mpa gpa j k c rad deg time mass force "
-    "pressure stress".split()
-)
+_BESIDE = {
+    "unit", "units", "of", "length", "lengths", "distance", "distances", "dimension", "dimensions", "all", "are", "is",
+    "in", "the", "given", "expressed", "measured", "and", "file", "system", "mass", "time", "force", "pressure",
+    "stress", "kg", "g", "mg", "t", "tonne", "s", "ms", "sec", "seconds", "min", "h", "n", "kn", "mn", "pa", "kpa",
+    "mpa", "gpa", "j", "k", "c", "rad", "deg",
+}  # fmt: skip
 # Words of files of images, whose lengths may be in voxels.
 _VOXELS = {"voxel", "voxels", "vox", "pixel", "pixels", "px"}
 # Units that are also words or letters of other meanings: in running text they say nothing.
@@ -36,12 +39,14 @@ _WORD = re.compile(r"(?<![^\W_])[^\W\d_]+(?![^\W_]|\^|\*\*)")
 _GLUED = re.compile(r"(?<=\d)[^\W\d_]+(?![^\W_]|\^|\*\*)")  # 5um
 _JOINED = re.compile(r"\b(length|units?)(?=(?:length|unit)s?\b)", re.IGNORECASE)  # UnitLength
 _EXPLICIT = re.compile(
-    r"(?:\bunits?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?|\b(?:lengths|distances|dimensions)\s+(?:are\s+)?(?:given\s+)?in\s+)"
+    r"(?:\bunits?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?"
+    r"|\b(?:lengths|distances|dimensions)\s+(?:are\s+)?(?:given\s+)?in\s+)"
     r"([^\W\d_]+)(?![\w/^*])",
     re.IGNORECASE,
 )
 _ONLY = re.compile(
-    r"(?:(?:length|distance)s?[\s_]*)?units?(?:[\s_]*(?:of[\s_]*)?(?:length|distance)s?)?\s*[:=]\s*[\"'(\[{]?(\S{1,40}?)[\"')\]}.,;]*",
+    r"(?:(?:length|distance)s?[\s_]*)?units?(?:[\s_]*(?:of[\s_]*)?(?:length|distance)s?)?\s*[:=]\s*"
+    r"[\"'(\[{]?(\S{1,40}?)[\"')\]}.,;]*",
     re.IGNORECASE,
 )
 _SCALES = re.compile(

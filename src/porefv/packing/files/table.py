@@ -229,9 +229,10 @@ def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
 
 
 def _is_numbers(text: str) -> bool:
-    """Whether a line is a row of spheres: three numbers or more, and a third of the cells."""
-    cells = split(text, _delimiter(text))
-    return sum(map(_is_number, cells)) >= max(3, len(cells) / 3)
+    """Whether a line is a row of spheres: three numbers or more. Between blanks also words of a header may be such."""
+    delimiter = _delimiter(text)
+    cells = split(text, delimiter)
+    return sum(map(_is_number, cells)) >= max(3, len(cells) / 3 if delimiter is None else 0)
 
 
 def _is_number(cell: str) -> bool:

@@ -1,8 +1,8 @@
 """Extended XYZ, as OVITO and ASE write it: frames of a line with N, a line of keys, and N lines.
 
 ``Properties=species:S:1:pos:R:3:radius:R:1`` names the columns, ``Lattice="..."`` gives the box from ``Origin="..."``
-or the origin, and ``pbc="T T F"`` says along which axes it is periodic. Without pbc, a box is periodic along all axes, as
-ASE reads it.
+or the origin, and ``pbc="T T F"`` says along which axes it is periodic. Without pbc, a box is periodic along all axes,
+as ASE reads it.
 """
 
 from __future__ import annotations
