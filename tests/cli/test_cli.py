@@ -105,6 +105,29 @@ def test_plot_draws_a_picture(write_scene, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_plot_replaces_a_picture_only_on_demand(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(
+        "porefv.results.drawing.draw_packing", lambda packing, name, path: path.write_bytes(b"a new picture")
+    )
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"earlier")
+    arguments = ["plot", str(DATA / "packings" / "n25_s1.csv"), "--out", str(picture)]
+    assert main(arguments) == 2
+    assert "picture.png exists already: choose another with --out, or add --force" in capsys.readouterr().err
+    assert picture.read_bytes() == b"earlier"
+    assert main([*arguments, "--force"]) == 0
+    assert picture.read_bytes() == b"a new picture"
+
+
+def test_a_warning_is_said_once(write_scene, tmp_path, capsys):
+    rows = (DATA / "packings" / "n25_s1.csv").read_text().splitlines()
+    x, y, z, radius = map(float, rows[-1].split(","))
+    near = tmp_path / "near.csv"
+    near.write_text("\n".join([*rows, f"{x - 0.001 * (x > 0.5)},{y},{z},{radius}", ""]))
+    assert main(["solve", str(write_scene(tmp_path, near))]) == 0
+    assert capsys.readouterr().err.count("one sphere lies within another but for less than") == 1
+
+
 # What is imported
 
 
@@ -147,9 +170,9 @@ def test_bad_input_is_status_2_and_no_traceback(arguments, tmp_path):
 
 def test_an_unknown_option_is_refused_with_the_usage_of_its_command(capsys):
     with pytest.raises(SystemExit, match="2"):
-        main(["plot", "results", "--out", "picture.png", "--force"])
+        main(["plot", "results", "--out", "picture.png", "--resume"])
     error = capsys.readouterr().err
-    assert error.startswith("usage: porefv plot ") and "porefv plot: error: unrecognized arguments: --force" in error
+    assert error.startswith("usage: porefv plot ") and "porefv plot: error: unrecognized arguments: --resume" in error
 
 
 def test_errors_name_file_and_line(scene):

@@ -318,7 +318,7 @@ class Figure:
 
 def test_plot(survives, whole_run, monkeypatch):
     monkeypatch.setattr("porefv.simulation.series_picture.series_picture", lambda directory: Figure())
-    arguments = ["plot", "results", "--out", "picture.png"]
+    arguments = ["plot", "results", "--out", "picture.png", "--force"]
 
     def prepare(folder):
         put(whole_run, folder, "results")

@@ -44,6 +44,7 @@ def register(commands: Any) -> None:
         "--size", metavar="WIDTHxHEIGHT", type=_size, help="width and height in pixels, 1600x1200 by default"
     )
     parser.add_argument("--dpi", type=float, help="pixels per inch, 200 by default: the more, the larger the letters")
+    parser.add_argument("--force", action="store_true", help="replace a picture that exists")
     parser.set_defaults(command=run)
 
 
@@ -59,6 +60,8 @@ def run(options: argparse.Namespace) -> None:
     from porefv.simulation.run_record import is_simulation
     from porefv.system.progress import Progress
 
+    if options.out.exists() and not options.force:
+        raise InputError(f"{options.out} exists already: choose another with --out, or add --force")
     given = {name: getattr(options, name) for name in ("axis", "at", "size", "dpi")}
     given = {name: value for name, value in given.items() if value is not None}
     with Progress().stage("drawing"):

@@ -134,9 +134,17 @@ def _open_closed_streams() -> None:
 
 @contextmanager
 def _warnings_in_a_line(quiet: bool) -> Iterator[None]:
-    """Say warnings as errors are said, or not at all."""
+    """Say warnings as errors are said, each once, or not at all."""
+    said: set[str] = set()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        # Where a packing is validated twice, the same is found twice.
+        if not quiet and str(message) not in said:
+            said.add(str(message))
+            _complain(f"porefv: {message}")
+
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: None if quiet else _complain(f"porefv: {message}")
+        warnings.showwarning = show
         yield
 
 

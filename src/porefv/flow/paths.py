@@ -240,7 +240,8 @@ def _assemble(flow: PoreFlow, entries: np.ndarray, visits: _Visits, stays: np.nd
     if (stays[visited] < 0.0).any():
         pore = int(visited[np.argmax(stays[visited] < 0.0)])
         raise ComputationError(
-            f"pore {pore} has a void volume below zero, as spheres overlap, or reach through flat cells: no residence time"
+            f"pore {pore} has a void volume below zero, as spheres overlap, or reach through flat cells: there is no "
+            "residence time"
         )
     t = len(mesh.throats)
     came = np.empty(len(taken), int)

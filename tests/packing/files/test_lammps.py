@@ -279,7 +279,7 @@ def test_a_title_that_speaks_of_units_without_naming_them_states_none(read):
 
 
 def test_atoms_without_a_style_are_said_to_be_read_as_spheres(read):
-    assert read(DATA.replace("Atoms  # sphere", "Atoms")).reading.notes == (
+    assert read(DATA.replace("Masses\n\n1 2500\n", "").replace("Atoms  # sphere", "Atoms")).reading.notes == (
         "no style after Atoms, read as atom_style sphere",
     )
     assert read(DATA).reading.notes == ()
@@ -298,3 +298,49 @@ def test_one_frame_without_a_line_end_is_warned_of(read):
     whole = DATA.partition("Velocities")[0].replace(" 0 0 0\n", "\n").replace(" 0 0 0  #", " #").rstrip()
     with pytest.warns(PackingFileWarning, match="may have lost digits"):
         read(whole)
+
+
+@pytest.mark.parametrize(
+    ("title", "metres"),
+    [
+        ("metal units", 1e-10), ("micro units", 1e-6), ("unit: cgs", 1e-2), ("units in cm", 1e-2), ("units = mm", 1e-3),
+        ("a packing, lengths in mm", 1e-3), ("units=real, atom_style sphere", 1e-10),
+    ],
+)  # fmt: skip
+def test_a_title_states_units_in_other_words(read, title, metres):
+    packing = read(DATA.replace("LAMMPS data file, any title: Atoms", title))
+    np.testing.assert_allclose(packing.radii, np.array([0.05, 0.1, 0.15]) * metres, rtol=1e-14)
+
+
+@pytest.mark.parametrize("title", ["lj units", "grains of 3 mm"])
+def test_a_title_with_a_unit_that_is_not_known_or_not_understood_needs_a_scale(read, title):
+    content = DATA.replace("LAMMPS data file, any title: Atoms", title)
+    with pytest.raises(InputError, match=r"line 1: .* as scale"):
+        read(content)
+    assert read(content, scale=2.0).radii[0] == 0.1
+
+
+def test_image_flags_tell_that_a_packing_is_periodic(read):
+    for content, axes in (
+        (DATA.replace("0.9 0 0 0", "0.9 0 -1 0"), "y"),
+        (frame(0, 0.1, "id type x y z radius ix iy iz").replace(" 0.1\n", " 0.1 1 0 0\n"), "x"),
+    ):
+        with pytest.raises(InputError, match=rf"periodic along {axes} \(image flags that are not 0\)"):
+            read(content)
+        assert "image flags" in read(content, periodic="ignore").reading.periodicity
+    assert read(frame(0, 0.1, "id type x y z radius ix iy iz").replace(" 0.1\n", " 0.1 0 0 0\n")).radii[0] == 0.1
+
+
+def test_atoms_of_another_style_are_not_read_as_spheres(read):
+    full = DATA.replace("Atoms  # sphere", "Atoms")
+    with pytest.raises(InputError, match="no atom_style stands after Atoms, and with Masses it is not sphere"):
+        read(full)
+    with pytest.raises(InputError, match=r"the density of atom_style sphere, the fourth cell, is not positive"):
+        read(full.replace("Masses\n\n1 2500\n", "").replace("0.3 2500", "0.3 0"))
+
+
+def test_units_of_names_and_of_the_dump_must_agree(read):
+    content = "ITEM: UNITS\ncgs\n" + frame(0, 0.1)
+    assert read(content).radii[0] == 0.001
+    with pytest.raises(InputError, match="the unit is 'cgs.*', and the names of columns state 'mm'"):
+        read(content.replace("x y z radius", "x(mm) y(mm) z(mm) radius(mm)"), columns={k: f"{k}(mm)" for k in "xyz"})

@@ -109,10 +109,47 @@ def test_periodic_boundaries_are_ignored_on_demand(read):
         assert read(content, periodic="ignore").reading.periodicity.startswith("periodic along x, y, z")
 
 
-def test_a_lattice_without_pbc_is_noted(read):
-    packing = read(XYZ.format(0.1).replace('pbc="F F F" ', ""))
-    assert packing.reading.notes == ("Lattice without pbc, read as a box with walls",)
-    assert read(XYZ.format(0.1)).reading.notes == ()
+def test_a_lattice_without_pbc_is_periodic_as_ase_reads_it(read):
+    content = XYZ.format(0.1).replace('pbc="F F F" ', "")
+    with pytest.raises(InputError, match=r"line 2: the packing is periodic along x, y, z \(Lattice without pbc"):
+        read(content)
+    assert "Lattice without pbc" in read(content, periodic="ignore").reading.periodicity
+    assert read(XYZ.format(0.1)).reading.periodicity == ""
+
+
+@pytest.mark.parametrize(
+    ("key", "axes"),
+    [
+        ('periodic="T T T"', "x, y, z"), ('boundary="pp ff pp"', "x, z"), ('pbc = "T F F"', "x"), ("pbc='F T F'", "y"),
+        ('pbc="[true, true, false]"', "x, y"), ("pbc=T", "x, y, z"),
+    ],
+)  # fmt: skip
+def test_periodic_boundaries_by_other_keys_and_forms(read, key, axes):
+    content = XYZ.format(0.1).replace('pbc="F F F"', key)
+    with pytest.raises(InputError, match=f"line 2: the packing is periodic along {axes} "):
+        read(content)
+    assert len(read(content, periodic="ignore")) == 2
+
+
+def test_a_value_of_pbc_that_is_not_understood_is_refused(read):
+    with pytest.raises(InputError, match="line 2: pbc='2 2' is not understood. Write pbc="):
+        read(XYZ.format(0.1).replace('"F F F"', '"2 2"'))
+
+
+def test_whole_frames_of_a_gzip_file_that_is_cut_off_are_read(read):
+    rng = np.random.default_rng(0)
+    rows = "".join("{:.17g} {:.17g} {:.17g} 0 0 0 0.1 0 0 0 0 0 0 0\n".format(*rng.random(3)) for _ in range(400))
+    frames = f"400 0 0 0 0 1 1 1\n{rows}" + f"400 1 0 0 0 1 1 1\n{rows}"
+    compressed = gzip.compress(frames.encode())
+    with pytest.warns(
+        PackingFileWarning, match="the gzip file is cut off, and only its beginning is read: 1 whole frame"
+    ):
+        packing = read(compressed[: -len(compressed) // 4], "a.data.gz")
+    assert len(packing) == 400 and packing.reading.frames == 1
+    with pytest.raises(InputError, match="the gzip file is cut off. Make or fetch it again"):
+        read(compressed[: len(compressed) // 4], "a.data.gz")  # within the first frame
+    with pytest.raises(InputError, match="the gzip file is cut off. Make or fetch it again"):
+        read(gzip.compress(f"x,y,z,r\n{rows}".encode())[:-20], "a.csv.gz")  # a table has no number of its spheres
 
 
 def test_plain_xyz_needs_a_radius(read):
@@ -189,7 +226,7 @@ def test_damaged_gzip_files_are_refused(read):
 
 
 def test_a_unit_in_the_comment_of_extended_xyz_is_honoured(read):
-    for key in ("units=mm", "Unit=mm", 'length_unit="mm"'):
+    for key in ("units=mm", "Unit=mm", 'length_unit="mm"', "UnitLength=mm", "units: mm", "units='mm'", "units = mm"):
         packing = read(XYZ.format(0.1).replace("Time=1", key), "grains.xyz")
         np.testing.assert_allclose(packing.radii, 1e-4, rtol=1e-15)
         np.testing.assert_allclose(packing.box.upper, [1e-3, 2e-3, 3e-3], rtol=1e-15)

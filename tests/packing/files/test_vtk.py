@@ -176,3 +176,31 @@ def test_the_last_whole_frame_of_a_list_is_read(tmp_path):
     assert (packing.reading.frame, packing.reading.frames) == (0, 1)
     with pytest.raises(InputError, match="its frame 1 cannot be read"):
         Packing.read(tmp_path / "grains.pvd", frame=1)
+
+
+def test_the_title_of_a_legacy_file_may_state_a_unit(tmp_path):
+    file = tmp_path / "grains.vtk"
+    file.write_text(LEGACY.replace("spheres", "spheres, units = mm", 1) + "\n")
+    np.testing.assert_allclose(Packing.read(file).radii, [0.25e-3, 0.375e-3], rtol=1e-15)
+    file.write_text(LEGACY.replace("spheres", "voxel size = 5 um", 1) + "\n")
+    with pytest.raises(InputError, match=r"line 2: 'voxel size = 5 um' names a unit or a scale .* as scale"):
+        Packing.read(file)
+
+
+def test_percent_signs_in_names_are_decoded(tmp_path):
+    file = tmp_path / "grains.vtk"
+    file.write_text(LEGACY.replace("SCALARS radius", "SCALARS radius%20(mm)") + "\n")
+    with pytest.raises(InputError, match=r"'radius \(mm\)' states a unit, and 'x' states none"):
+        Packing.read(file)
+    np.testing.assert_allclose(Packing.read(file, scale=2.0).radii, [0.5, 0.75], rtol=1e-15)
+
+
+def test_of_a_list_that_is_cut_off_the_whole_entries_are_read(tmp_path):
+    (tmp_path / "0.vtk").write_text(LEGACY + "\n")
+    entries = "".join(f'<DataSet timestep="{k}" file="{k}.vtk"/>\n' for k in range(2))
+    content = f'<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>'
+    for cut in (content[:-40], content[:-30].replace('"1.vtk"', '"0.vtk"')[:90]):
+        (tmp_path / "grains.pvd").write_text(cut)
+        with pytest.warns(PackingFileWarning, match=r"line \d: the last frame is cut off, and the whole one before"):
+            packing = Packing.read(tmp_path / "grains.pvd")
+        assert packing.reading.frames == 1 and "cut off" in packing.reading.notes[-1]

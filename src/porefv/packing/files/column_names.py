@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 
 from porefv.errors import InputError
 from porefv.packing.files.content import LengthUnit, missing_radius, warn_radius
+from porefv.packing.files.length_units import UNITS, metres
 from porefv.packing.files.options import ROLES, ReadOptions
 from porefv.packing.files.text import AnyPath, quoted
-
-# Metres in units of length that column names state.
-UNITS = {
-    "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0, "dm": 1e-1, "cm": 1e-2, "mm": 1e-3,
-    "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "micron": 1e-6, "microns": 1e-6, "nm": 1e-9, "km": 1e3,
-}  # fmt: skip
 
 # The words of a name are joined, in lower case, and these are left out before and after the axis or the size.
 _OWNERS = r"(?:particle|sphere|grain|bead|atom)?"
@@ -28,8 +23,12 @@ _AXIS = re.compile(rf"{_OWNERS}(?:{_PLACES}?([xyz])|([xyz]){_PLACES})")
 _COMPONENT = re.compile(rf"{_OWNERS}{_POINTS}([012])")
 _SIZE = re.compile(rf"{_OWNERS}(?:equivalent|equiv|eq)?(?:(r|rad|radius|radii)|(d|diam|diameter|diameters)){_OWNERS}")
 _QUERY = re.compile(r"^Q\d+ ?: ?")  # of an EDEM export
-_BRACKETS = re.compile(r"(.*?)[\s,_/]*[\(\[]\s*([^\)\]]*?)\s*[\)\]]")
-_SUFFIX = re.compile(rf"(.+?)(?:[\s_]|\s*/\s*)({'|'.join(UNITS)})")
+_TIME = re.compile(r"\s*:\s*Time\s+[0-9.eE+-]+\s*[a-z]*(?=\s*[\[(]|$)")  # of an export of Rocky
+_BRACKETS = re.compile(r"(.*?)[\s,_/]*[\(\[{<]\s*([^\)\]}>]*?)\s*[\)\]}>]")
+_SUFFIX = re.compile(r"(.+?)(?:[\s_.]+in[\s_.]+|\s*[\s_/.:,\-]+\s*)([^\W\d_]+)\.?")  # x_mm, x / mm, x in mm, x.mm.
+_WORD = re.compile(r"[^\W\d_]+(?: ?\d)?")
+
+_NO_NUMBERS = {"nan", "inf", "na", "null", "none", "missing"}
 
 # Two columns for the same thing may differ by so much of it: digits lost when they were written.
 _ROUNDING = 1e-4
@@ -60,14 +59,10 @@ def recognised(name: str) -> tuple[str, str] | None:
     >>> recognised("Position X (mm)"), recognised("Points:2"), recognised("Radius"), recognised("vx")
     (('x', 'mm'), ('z', ''), ('radius', ''), None)
     """
-    name, unit = _QUERY.sub("", name.strip().strip("\"'").strip()), ""
+    name = _TIME.sub("", _QUERY.sub("", name.strip().strip("\"'").strip()))
     if len(name) > 60:
         return None
-    if match := _BRACKETS.fullmatch(name):
-        # Points[0], and otherwise a unit.
-        name, unit = (name, "") if match[2].isdigit() else (match[1], match[2])
-    elif match := _SUFFIX.fullmatch(name):
-        name, unit = match.groups()
+    name, unit = _split_unit(name)
     joined = re.sub(r"[\s_:.\-\[\]]", "", name.lower())
     if match := _AXIS.fullmatch(joined):
         return match[1] or match[2], unit
@@ -76,6 +71,16 @@ def recognised(name: str) -> tuple[str, str] | None:
     if match := _SIZE.fullmatch(joined):
         return ("radius" if match[1] else "diameter"), unit
     return None
+
+
+def _split_unit(name: str) -> tuple[str, str]:
+    """The name of a column without the unit that it states, and this unit, known or not, or an empty text."""
+    if match := _BRACKETS.fullmatch(name):
+        # Points[0], and otherwise a unit.
+        return (name, "") if match[2].isdigit() else (match[1], match[2])
+    if (match := _SUFFIX.fullmatch(name)) and match[2].lower() in UNITS:
+        return match[1], match[2]
+    return name, ""
 
 
 def roles(names: Iterable[str], options: ReadOptions) -> set[str]:
@@ -168,9 +173,7 @@ def _mapped(place: str, role: str, names: list[str], wanted: str) -> Column:
         how = "is no column" if not places else f"names {len(places)} columns"
         shown = ", ".join(map(quoted, names[:12])) + (", ..." if len(names) > 12 else "")
         raise InputError(f"{place}: {quoted(wanted)}, given for {role}, {how}. Columns: {shown}.")
-    known = recognised(names[places[0]])
-    unit = known[1] if known else (match[2] if (match := _BRACKETS.fullmatch(names[places[0]])) else "")
-    return Column(role, places[0], names[places[0]], unit)
+    return Column(role, places[0], names[places[0]], _split_unit(names[places[0]])[1])
 
 
 def positions(columns: Sequence[Column]) -> dict[str, int]:
@@ -203,10 +206,8 @@ def spheres(
         If units are not known, or columns disagree.
     """
     unit = _unit(place, columns, options)
-    factors = [
-        UNITS[column.unit.lower()] / UNITS[columns[0].unit.lower()] if unit and unit.metres else 1.0
-        for column in columns
-    ]
+    sizes = [metres(column.unit) for column in columns]
+    factors = [size / sizes[0] if unit and unit.metres and size and sizes[0] else 1.0 for size in sizes]
     found: dict[str, tuple[NDArray, str]] = {}
     for column, factor, column_values in zip(columns, factors, values.T, strict=True):
         role = "radius" if column.role == "diameter" else column.role
@@ -228,25 +229,18 @@ def spheres(
     return centres, radii, unit, {role: name for role, (_, name) in found.items()}
 
 
-def agreed_unit(unit: LengthUnit | None, stated: LengthUnit | None, options: ReadOptions) -> LengthUnit | None:
-    """The unit of the names of columns, or else that stated elsewhere in the file; InputError if they differ."""
-    if unit and stated and unit.metres != stated.metres and options.scale is None:
-        raise InputError(
-            f"{stated.place}: the unit is {quoted(stated.name)}, and the names of columns state {quoted(unit.name)}. "
-            "Give the length of the unit in m as scale."
-        )
-    return unit or stated
-
-
 def units_below(place: str, columns: Sequence[Column], cells: Sequence[str]) -> list[Column] | None:
     """The columns with the units that a row under the header states; None if the row is none of units."""
     if any(column.position >= len(cells) for column in columns):
         return None
-    units = [cells[column.position].strip().strip("[]()").strip() for column in columns]
-    if not all(unit.lower() in UNITS for unit in units):
+    units = [cells[column.position].strip().strip("[](){}<>\"'").strip() for column in columns]
+    known = [metres(unit) is not None for unit in units]
+    # Words that are no known units may be such, unless they are names, or say that a number is missing.
+    words = all(_WORD.fullmatch(unit) and not recognised(unit) and unit.lower() not in _NO_NUMBERS for unit in units)
+    if not all(known) and not (words and (any(known) or len(set(units)) == 1)):
         return None
     for column, unit in zip(columns, units, strict=True):
-        if column.unit and column.unit.lower() != unit.lower():
+        if column.unit and metres(column.unit) != metres(unit):
             raise InputError(
                 f"{place}: the unit under {quoted(column.name)} is {quoted(unit)}. Correct the name or the unit."
             )
@@ -272,10 +266,13 @@ def _unit(place: str, columns: Sequence[Column], options: ReadOptions) -> Length
             f"{place}: {quoted(with_unit.name)} states a unit, and {quoted(without.name)} states none. Give the length "
             "of the unit of all columns in m as scale."
         )
-    unknown = [unit for unit in stated if unit.lower() not in UNITS]
+    unknown = sorted(unit for unit in stated if unit and metres(unit) is None)
     if unknown or "" in stated:
         if len(stated) > 1 and len(stated - {""}) > 1:
-            raise InputError(f"{place}: the columns have different units ({', '.join(sorted(stated))}), not all known.")
+            raise InputError(
+                f"{place}: the columns have different units ({', '.join(sorted(stated))}), not all known. Write all "
+                "lengths in one unit."
+            )
         return LengthUnit(next(iter(unknown), next(iter(stated - {""}))), None, place)
     name = "columns' units (" + ", ".join(sorted(stated)) + ")" if len(stated) > 1 else next(iter(stated))
-    return LengthUnit(name, UNITS[columns[0].unit.lower()], place)
+    return LengthUnit(name, metres(columns[0].unit), place)

@@ -30,11 +30,14 @@ class LengthUnit:
         None: the size of the unit is not known.
     place : str
         Where it is stated, as the start of an error: ``a.dump, line 2``.
+    clear : bool
+        False: `name` is a line that names a unit or a scale, and is not understood.
     """
 
     name: str
     metres: float | None
     place: str
+    clear: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +89,8 @@ class FileContent:
         if options.radius is not None:
             notes = (*notes, f"radius of all spheres {options.radius:.9g} m, given")
         reading = Reading(
-            self.format, self.unit.name if self.unit else "", scale, dict(self.columns), self.frame, self.frames,
-            self.periodicity, place, (*self.notes, *notes),
+            self.format, self.unit.name if self.unit and self.unit.clear else "", scale, dict(self.columns), self.frame,
+            self.frames, self.periodicity, place, (*self.notes, *notes),
         )  # fmt: skip
         return Packing(centres, radii, box, Source(path, self.lines, reading), dict(self.metadata))
 
@@ -95,6 +98,11 @@ class FileContent:
         """Length of the file's unit in m, and what is to be noted about it."""
         unit = self.unit
         if options.scale is None:
+            if unit is not None and not unit.clear:
+                raise InputError(
+                    f"{unit.place}: {quoted(unit.name)} names a unit or a scale of lengths, and is not understood. "
+                    "Give the length of the unit of the file in m as scale (1 if it is the metre)."
+                )
             if unit is not None and unit.metres is None:
                 raise InputError(
                     f"{unit.place}: lengths are in {quoted(unit.name)}, and how long that is in m is not known. "

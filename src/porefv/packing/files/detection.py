@@ -71,7 +71,7 @@ def _by_content(beginning: bytes) -> str | None:
     lines = text.splitlines()
     rows = [line.split() for line in lines[:3]]
     if len(rows) > 1:
-        if re.fullmatch("[0-9]{1,15}", lines[0].strip()) and re.search(r"\b(Lattice|Properties)=", lines[1], re.I):
+        if re.fullmatch("[0-9]{1,15}", lines[0].strip()) and re.search(r"\b(Lattice|Properties)\s*=", lines[1], re.I):
             return "xyz"
         if is_mercury(rows[0], rows[1]):
             return "mercury"

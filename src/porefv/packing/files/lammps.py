@@ -17,6 +17,7 @@ from porefv.errors import InputError
 from porefv.packing.files.column_names import Column, chosen_columns, positions, recognised, spheres
 from porefv.packing.files.content import FileContent, LengthUnit, periodicity
 from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
+from porefv.packing.files.length_units import agreed_unit, metres, stated_unit
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, text_lines
 
@@ -31,8 +32,12 @@ _STYLES = ("", "sphere", "granular")  # what may follow "Atoms #" in a data file
 # What a frame of a dump must hold; the first that occurs in a line names the item.
 _ITEMS = ("NUMBER OF ATOMS", "BOX BOUNDS", "ATOMS")
 
-# Units in a title without an equals sign: "units cgs", or "cgs units".
-_UNITS_IN_WORDS = re.compile(rf"(?i:\bunits:?\s+(?={'|'.join(UNITS)}\b)|\b(?=(?:si|cgs)\s+units\b))(\w+)")
+# Units in a title: "units = cgs", "units cgs", "unit: cgs", or "cgs units".
+_SYSTEM = "|".join(UNITS)
+_UNITS_IN_WORDS = re.compile(rf"(?i:\bunits?\s*[:=]?\s*({_SYSTEM})\b|\b({_SYSTEM})\s+units?\b)")
+_UNITS_KEY = re.compile(r"\bunits\s*=\s*(\w+)")  # as LAMMPS writes it
+
+_FLAGS = ("ix", "iy", "iz")
 
 _COUNT = re.compile("[0-9]{1,15}")
 
@@ -48,8 +53,23 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
 
 
 def _unit(path: AnyPath, line: int, name: str) -> LengthUnit:
-    unit, metres = UNITS.get(name, ("", None))
-    return LengthUnit(f"{name} ({unit})" if metres is not None else name, metres, f"{path}, line {line}")
+    unit, size = UNITS.get(name, ("", metres(name)))
+    return LengthUnit(f"{name} ({unit})" if unit and size is not None else name, size, f"{path}, line {line}")
+
+
+def _title_unit(path: AnyPath, title: str) -> LengthUnit | None:
+    """The unit that the title of a data file, its first line, states."""
+    if match := _UNITS_IN_WORDS.search(title):
+        return _unit(path, 1, (match[1] or match[2]).lower())
+    if match := _UNITS_KEY.search(title):
+        return _unit(path, 1, match[1])
+    return stated_unit(f"{path}, line 1", title)
+
+
+def _crossed(path: AnyPath, line: int, flags: NDArray, options: ReadOptions) -> str:
+    """What is said of image flags other than 0: an atom has one once it has crossed a periodic boundary."""
+    axes = "".join(axis for axis, flag in zip("xyz", flags.T, strict=False) if flag.any())
+    return periodicity(f"{path}, line {line}", axes, "image flags that are not 0", options)
 
 
 def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileContent:
@@ -64,8 +84,11 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     chosen_frame(path, 1, options)
     if options.columns or options.radius is not None:
         raise InputError(f"{path}: a LAMMPS data file has columns of its own. Drop columns and radius.")
-    # Of the title, line 1, LAMMPS reads only the units that it may state.
-    title = re.search(r"\bunits\s*=\s*(\w+)", lines[0]) or _UNITS_IN_WORDS.search(lines[0])
+    if not style and "Masses" in texts:
+        raise InputError(
+            f"{path}, line {start + 1}: no atom_style stands after Atoms, and with Masses it is not sphere, in which "
+            "each atom has a density. If it is, write 'Atoms # sphere'."
+        )
     number, corners = _data_header(path, texts[1:start])
     rows = Rows(path, texts[start + 1 :], first=start + 2)
     end = next((k for k, text in enumerate(rows.texts) if text[0].isalpha()), len(rows.texts))
@@ -77,7 +100,15 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
             f"{path}, line {rows.numbers[0]}: {cells} cells where atom_style sphere has 7 (id type diameter "
             "density x y z), or 10 with image flags."
         )
-    values, numbers = rows.columns({"id": 0, "x": 4, "y": 5, "z": 6, "diameter": 2}, cells)
+    columns = {"id": 0, "x": 4, "y": 5, "z": 6, "diameter": 2, "density": 3}
+    columns |= dict(zip(_FLAGS, range(7, cells), strict=False))
+    values, numbers = rows.columns(columns, cells)
+    if not style and not (values[:, 5] > 0).all():
+        raise InputError(
+            f"{path}, line {numbers[np.argmin(values[:, 5])]}: no atom_style stands after Atoms, and the density of "
+            "atom_style sphere, the fourth cell, is not positive. If it is this style, write 'Atoms # sphere'."
+        )
+    said = _crossed(path, start + 1, values[:, 6:], options)
     order = _by_id(path, values[:, 0], numbers)
     values = values[order]
     notes = () if style else ("no style after Atoms, read as atom_style sphere",)
@@ -85,8 +116,8 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
         notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
     return FileContent(
         "LAMMPS data file, atom_style sphere", values[:, 1:4], values[:, 4] / 2, corners, "xlo xhi, ylo yhi, zlo zhi",
-        _unit(path, 1, title[1].lower()) if title else None, numbers[order],
-        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, notes=notes,
+        _title_unit(path, lines[0]), numbers[order],
+        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, periodicity=said, notes=notes,
     )  # fmt: skip
 
 
@@ -155,19 +186,22 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     wanted = positions(columns)
     if rows.numbers[-1] == len(lines) and len(names) - 1 in wanted.values():
         notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
+    wanted |= {f"image flag {name}": names.index(name) for name in _FLAGS if set(_FLAGS) <= set(names)}
     if "id" in names:
         wanted["atom id"] = names.index("id")
     values, numbers = rows.columns(wanted, len(names))
     if "id" in names:
         order = _by_id(path, values[:, -1], numbers)
         values, numbers = values[order, :-1], numbers[order]
+    values, flags = np.split(values, [len(columns)], axis=1)
+    said = said or _crossed(path, start + 1, flags, options)
     with np.errstate(over="ignore", invalid="ignore"):
         for k, axis in scaled.items():
             values[:, k] = corners[0][axis] + values[:, k] * (corners[1] - corners[0])[axis]
     centres, radii, unit, shown = spheres(f"{path}, line {start + 1}", columns, values, options)
     return FileContent(
-        "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", frame.unit or unit, numbers, shown, chosen, len(frames),
-        said, notes,
+        "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", agreed_unit(unit, frame.unit, options), numbers, shown,
+        chosen, len(frames), said, notes,
     )  # fmt: skip
 
 

@@ -1,14 +1,17 @@
 """Who reads and writes each format of packing files."""
 
+import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from os import PathLike
 
-from porefv.errors import InputError
+from porefv.errors import InputError, PackingFileWarning, counted
 from porefv.packing.box import Box
 from porefv.packing.files import csv, esys, lammps, mercury, pvd, table, vtk, xyz, xyzd, yade
+from porefv.packing.files.content import FileContent
 from porefv.packing.files.detection import EXTENSIONS, detected, extension
 from porefv.packing.files.options import ReadOptions
-from porefv.packing.files.text import read_bytes
+from porefv.packing.files.text import CutOffError, read_bytes
 from porefv.packing.packing import Packing
 
 _READERS = {
@@ -22,6 +25,7 @@ _READERS = {
     "xyz": xyz.read,
     "xyzd": xyzd.read,
 }
+_WITH_FRAMES = ("lammps", "mercury", "xyz")  # whose readers tell a whole frame from one that is cut off
 _WRITERS = {"csv": csv.write, "yade": yade.write, "vtk": vtk.write}
 
 FORMATS = tuple(_READERS)
@@ -77,8 +81,27 @@ def read_packing(
     options = ReadOptions(columns or {}, radius, scale, frame, periodic).check(path)
     if format is not None and format not in _READERS:
         raise InputError(f"{path}: format '{format}' cannot be read. Give one of {', '.join(_READERS)}.")
-    content = read_bytes(path)
+    try:
+        content = read_bytes(path)
+    except CutOffError as error:
+        return _beginning(path, format, error, options).packing(path, options, box)
     return _READERS[format or detected(path, content)](path, content, options).packing(path, options, box)
+
+
+def _beginning(path: str | PathLike[str], format: str | None, error: CutOffError, options: ReadOptions) -> FileContent:
+    """The whole frames in the beginning of a gzip file that is cut off, as a program leaves it that was stopped."""
+    found = format or (detected(path, error.beginning) if error.beginning.strip() else "")
+    if found not in _WITH_FRAMES:
+        raise error
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about the end, which is said below
+            content = _READERS[found](path, error.beginning, options)
+    except InputError:
+        raise error from None
+    note = f"the gzip file is cut off, and only its beginning is read: {counted(content.frames, 'whole frame')}"
+    warnings.warn(f"{path}: {note}.", PackingFileWarning, stacklevel=3)
+    return replace(content, notes=(*content.notes, note))
 
 
 def write_packing(packing: Packing, path: str | PathLike[str], format: str | None = None) -> None:

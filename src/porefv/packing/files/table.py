@@ -22,20 +22,22 @@ from numpy.typing import NDArray
 
 from porefv.errors import InputError
 from porefv.packing.files.column_names import (
-    UNITS,
     Column,
-    agreed_unit,
     chosen_columns,
     positions,
+    recognised,
     roles,
     spheres,
     units_below,
 )
-from porefv.packing.files.content import FileContent, LengthUnit, periodicity, warn_radius
+from porefv.packing.files.content import FileContent, warn_radius
 from porefv.packing.files.frames import chosen_frame, warn_no_end
+from porefv.packing.files.length_units import UNITS, agreed_unit
+from porefv.packing.files.metadata import read_metadata
 from porefv.packing.files.options import ReadOptions
-from porefv.packing.files.table_frames import keep_frame
-from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, read_metadata, split, text_lines
+from porefv.packing.files.statements import Statements, is_periodic_cell
+from porefv.packing.files.table_frames import keep_frame, refuse_blocks
+from porefv.packing.files.text import AnyPath, Rows, quoted, split, text_lines
 
 _DELIMITERS = (";", "\t", ",", None)
 _MOST_BEFORE = 100  # rows among which the header is looked for
@@ -43,7 +45,9 @@ _MOST_BEFORE = 100  # rows among which the header is looked for
 # A number with a decimal point or comma, and an exponent with E or, of Fortran, D.
 _WRITTEN_OTHERWISE = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eEdD][+-]?[0-9]+)?")
 
-_PERIODIC = "#PERIODIC::"  # after the # of a comment
+# A name in a header separated by blanks: with a unit behind it, as in x [mm], x {mm}, x / mm, x in mm.
+_BETWEEN_BLANKS = re.compile(rf"\S+(?:\s+(?:[\[({{<][^\s\])}}>]*[\])}}>]|/\s+\S+|in\s+(?:{'|'.join(UNITS)})\b))?")
+
 _SPHERE_PACK = "SpherePack text (x y z radius clump)"
 
 _HEADERLESS = (
@@ -67,9 +71,12 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     """Read a table; errors name the file and the line."""
     all_lines = text_lines(path, content)
     rows = Rows(path, all_lines)
+    comments = list(rows.comments)
     if not rows.texts:
         raise InputError(f"{path}: only comments. Give a header x,y,z,radius, then one sphere a line.")
     header = _header(path, rows, options)
+    comments += zip(rows.numbers[: header.skip], rows.texts[: header.skip], strict=True)
+    said = Statements.of(path, [(line, text) for line, text in comments if line != header.line], options)
     cells = len(header.names)
     if header.line:
         columns = chosen_columns(path, header.line, header.names, options)
@@ -79,17 +86,17 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     else:
         frame, frames = chosen_frame(path, 1, options), 1
         header, columns, values, lines = _without_names(path, rows, header, options)
+    refuse_blocks(path, all_lines, rows, header.skip)
     place = f"{path}, line {header.line}" if header.line else f"{path}"
     centres, radii, unit, names = spheres(place, columns, values, options)
-    unit = agreed_unit(unit, _unit_in_comments(path, rows), options)
+    unit = agreed_unit(unit, said.unit, options)
     # A last line of a comment, or in another frame, or whose last cell is not read, cannot lose digits that matter.
     last_read = any(column.position == cells - 1 for column in columns)
     notes = (warn_no_end(f"{path}, line {lines[-1]}"),) if last_read and lines[-1] == len(all_lines) else ()
-    corners, metadata = read_metadata(path, rows.comments)
+    corners, metadata = read_metadata(path, (comment for comment in rows.comments if comment[0] not in said.lines))
     box_place = "comments box_lower, box_upper"
-    cell, said = _periodic_cell(path, rows, options)
-    if cell is not None:
-        corners, box_place = cell, "##PERIODIC::"
+    if said.cell is not None:
+        corners, box_place = said.cell, "##PERIODIC::"
     return FileContent(
         header.format,
         centres,
@@ -101,7 +108,7 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         names,
         frame,
         frames,
-        periodicity=said,
+        periodicity=said.periodicity,
         notes=notes,
         metadata=metadata,
     )
@@ -145,6 +152,7 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
         for _, names in _cells_of_header(text)
         if len(names) == cells
     ]
+    found = [_with_row_names(header, rows.texts[first or 0], cells) for header in found]
     known = [len(roles(header.names, options) & {"x", "y", "z"}) for header in found]
     known = [
         0 if number == 1 and len(header.names) < 3 else number for number, header in zip(known, found, strict=True)
@@ -163,12 +171,20 @@ def _header(path: AnyPath, rows: Rows, options: ReadOptions) -> _Header:
     return _Header(names, rows.numbers[last], last + 1, mark, _with_header(mark))
 
 
+def _with_row_names(header: _Header, row: str, cells: int) -> _Header:
+    """The header with a name for a first column without one, of quoted names of rows, as R writes them."""
+    if len(header.names) + 1 == cells and row.lstrip().startswith('"'):
+        return replace(header, names=["", *header.names])
+    return header
+
+
 def _cells_of_header(text: str) -> Iterator[tuple[str | None, list[str]]]:
     """The names in a line, for each delimiter that the line has; units in brackets belong to the name before them."""
     text = re.sub(r"^\s*(?:[%!]|//|;\s)\s*", "", text)  # marks of comments in other programs
+    text = re.sub(r"^(?:columns|fields)\s*:\s*", "", text, flags=re.IGNORECASE)
     for mark in _DELIMITERS:
         if mark is None:
-            yield mark, re.findall(r"\S+(?:\s+[\[(][^\s\])]*[\])])?", text)
+            yield mark, _BETWEEN_BLANKS.findall(text)
         elif mark in text:
             yield mark, [name.strip() for name in split(text, mark)]
 
@@ -212,18 +228,11 @@ def _yade_format(path: AnyPath, line: int, text: str, rows: Rows) -> _Header:
     return _Header(names, line, 0, None, "Yade text (#format)")
 
 
-def _unit_in_comments(path: AnyPath, rows: Rows) -> LengthUnit | None:
-    """The unit of lengths that a comment like ``# units = mm`` states."""
-    for line, comment in rows.comments:
-        if match := re.fullmatch(r"(?:length[ _]?)?units?\s*[:=]\s*(\S{1,40})", comment, re.IGNORECASE):
-            return LengthUnit(match[1], UNITS.get(match[1].lower()), f"{path}, line {line}")
-    return None
-
-
 def _is_numbers(text: str) -> bool:
-    """Whether a line is a row of spheres: three numbers or more."""
-    cells = split(text, _delimiter(text))
-    return sum(map(_is_number, cells)) >= 3
+    """Whether a line is a row of spheres: three numbers or more. Between blanks also words of a header may be such."""
+    delimiter = _delimiter(text)
+    cells = split(text, delimiter)
+    return sum(map(_is_number, cells)) >= max(3, len(cells) / 3 if delimiter is None else 0)
 
 
 def _is_number(cell: str) -> bool:
@@ -244,6 +253,8 @@ def _without_names(
 ) -> tuple[_Header, list[Column], NDArray, NDArray]:
     """Columns by their places, the format that these tell, and all values."""
     cells, line = len(header.names), rows.numbers[header.skip]
+    if header.skip == 0:
+        _refuse_number_and_box(path, rows, header.delimiter)
     if options.columns:
         columns = chosen_columns(path, line, header.names, options)
         return header, columns, *_values(rows, columns, cells, header)
@@ -262,7 +273,7 @@ def _without_names(
             f"{path}, line {line}: the first of 4 columns without names numbers the spheres, and would be read "
             f"as x. {_HEADERLESS}"
         )
-    if cells == 5 and any(comment.startswith(_PERIODIC) for _, comment in rows.comments):
+    if cells == 5 and any(is_periodic_cell(comment) for _, comment in rows.comments):
         format = _SPHERE_PACK
     elif cells == 5:
         whole = bool((np.trunc(values[:, 4]) == values[:, 4]).all())
@@ -273,6 +284,7 @@ def _without_names(
             )
         format = "Voro++ text (id x y z radius)" if numbered else _SPHERE_PACK
         places = {role: place + numbered for role, place in places.items()}
+    _refuse_other_names(path, rows, list(places))
     if not sized:
         if cells == 5:
             warn_radius(path, f"place {places['radius'] + 1}")
@@ -294,18 +306,34 @@ def _is_numbering(values: NDArray) -> bool:
     return bool((np.sort(values) == np.arange(len(values)) + values.min()).all())
 
 
-def _periodic_cell(path: AnyPath, rows: Rows, options: ReadOptions) -> tuple[Corners | None, str]:
-    """Corners of the periodic cell of a SpherePack file, from the origin; and what is said of it."""
+def _refuse_number_and_box(path: AnyPath, rows: Rows, delimiter: str | None) -> None:
+    """Refuse a first row that may be the number of the others and a box: N Lx Ly Lz."""
+    first, *others = [split(text, delimiter)[0] for text in rows.texts]
+    whole = re.compile("[0-9]{1,15}")
+    if whole.fullmatch(first) and int(first) == len(others) and not all(map(whole.fullmatch, others)):
+        raise InputError(
+            f"{path}, line {rows.numbers[0]}: {quoted(rows.texts[0])} may be the number of the rows after it and the "
+            "sides of a box, or a sphere. Remove the line, and give the box; or name the columns in a header."
+        )
+
+
+def _refuse_other_names(path: AnyPath, rows: Rows, places: list[str]) -> None:
+    """Refuse a comment that names other columns, or in another order, than those that are read."""
     for line, comment in rows.comments:
-        if not comment.startswith(_PERIODIC):
+        named = _named(comment)
+        if not (set("xyz") <= set(named) or (named and re.search(r"\bcolumns?\b", comment, re.IGNORECASE))):
             continue
-        try:
-            size = np.array([float(word) for word in comment.removeprefix(_PERIODIC).split()])
-        except ValueError:
-            size = np.empty(0)
-        if size.shape != (3,):
+        expected = iter(places)
+        if not all(role in expected for role in named):
             raise InputError(
-                f"{path}, line {line}: ##PERIODIC:: must be followed by three numbers, not {quoted(comment)}."
+                f"{path}, line {line}: the comment {quoted(comment)} names {', '.join(named)}, and does not fit as a "
+                f"header of columns that would be read as {', '.join(places)}. {_HEADERLESS}"
             )
-        return (np.zeros(3), size), periodicity(f"{path}, line {line}", "xyz", "##PERIODIC::", options)
-    return None, ""
+
+
+def _named(text: str) -> list[str]:
+    """Of x, y, z, radius and diameter, those that a text names, in its order."""
+    words = [word.lower() for word in re.findall(r"(?<![^\W_])[^\W\d_]+(?![^\W_])", text)]
+    letters = [letter for word in words for letter in (word if re.fullmatch("xyz[rd]?", word) else [word])]
+    found = [known[0] for word in letters if (known := recognised(word))]
+    return found

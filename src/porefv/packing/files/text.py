@@ -1,4 +1,4 @@
-"""What the text formats share: lines of a file, columns of numbers, and `# key = value` comments."""
+"""What the text formats share: lines of a file, columns of numbers, cells and the box."""
 
 import csv
 import re
@@ -40,8 +40,23 @@ def text_lines(path: AnyPath, content: bytes) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
+class CutOffError(InputError):
+    """A gzip file that is cut off.
+
+    Parameters
+    ----------
+    message : str
+    beginning : bytes
+        What can be decompressed.
+    """
+
+    def __init__(self, message: str, beginning: bytes):
+        super().__init__(message)
+        self.beginning = beginning
+
+
 def read_bytes(path: AnyPath) -> bytes:
-    """The content of a file, decompressed if it is a gzip file; InputError if there is none."""
+    """The content of a file, decompressed if it is a gzip file; InputError if there is none, or it is cut off."""
     file = Path(path)
     try:
         if file.is_dir():
@@ -76,7 +91,7 @@ def _decompressed(path: AnyPath, content: bytes) -> bytes:
                     f"{path}: the file is compressed to less than 1/{_MOST_PER_BYTE} of its size. Decompress it first."
                 )
             if not stream.eof:
-                raise InputError(f"{path}: the gzip file is cut off. Make or fetch it again.")
+                raise CutOffError(f"{path}: the gzip file is cut off. Make or fetch it again.", b"".join(parts))
             content = stream.unused_data
     except zlib.error as error:
         raise InputError(f"{path}: the gzip file is damaged ({error}). Make or fetch it again.") from None
@@ -90,7 +105,7 @@ class Rows:
     ----------
     path : path
     lines : sequence of str
-        Consecutive lines of the file; blank lines and lines that start with # are set aside.
+        Consecutive lines of the file; blank lines and lines that start with #, after blanks or not, are set aside.
     first : int
         Number of the first of these lines in the file, counted from 1.
     """
@@ -101,8 +116,8 @@ class Rows:
         self.numbers: list[int] = []
         self.comments: list[tuple[int, str]] = []
         for number, line in enumerate(lines, first):
-            if line.startswith("#"):
-                self.comments.append((number, line[1:].strip()))
+            if line.lstrip().startswith("#"):
+                self.comments.append((number, line.lstrip()[1:].strip()))
             elif line and not line.isspace():
                 self.texts.append(line)
                 self.numbers.append(number)
@@ -188,55 +203,12 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= _MOST_QUOTED else text[: _MOST_QUOTED - 3] + "...")
 
 
-def read_metadata(path: AnyPath, comments: Iterable[tuple[int, str]]) -> tuple[Corners | None, dict[str, str]]:
-    """The corners of the box and the other values given by comments ``# key = value``; other comments are ignored.
-
-    Raises
-    ------
-    InputError
-        If ``box_lower`` or ``box_upper`` stands alone, twice, or is not three numbers.
-    """
-    metadata: dict[str, str] = {}
-    corners: dict[str, list[float]] = {}
-    for line, comment in comments:
-        match = re.fullmatch(r"(\w+)\s*=\s*(.*)", comment)
-        if match is None:
-            continue
-        key, value = match.groups()
-        if key not in ("box_lower", "box_upper"):
-            metadata[key] = value
-            continue
-        if key in corners:
-            raise InputError(f"{path}, line {line}: {key} is given twice.")
-        try:
-            corners[key] = [float(number) for number in re.split(r"[\s,;]+", value.strip("[]() "))]
-        except ValueError:
-            corners[key] = []
-        if len(corners[key]) != 3:
-            raise InputError(f"{path}, line {line}: {key} must be three numbers x y z, not {quoted(value)}.")
-    if not corners:
-        return None, metadata
-    if len(corners) == 1:
-        missing = ({"box_lower", "box_upper"} - set(corners)).pop()
-        raise InputError(f"{path}: a line '# {missing} = x y z' is missing.")
-    return (np.array(corners["box_lower"]), np.array(corners["box_upper"])), metadata
-
-
 def make_box(path: AnyPath, lower: ArrayLike, upper: ArrayLike) -> Box:
     """The box given in a file; InputError names the file."""
     try:
         return Box(np.array(lower), np.array(upper))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def metadata_comments(packing: Packing) -> list[str]:
-    """The lines that `read_metadata` reads back."""
-    lines = []
-    if packing.box is not None:
-        for key, corner in (("box_lower", packing.box.lower), ("box_upper", packing.box.upper)):
-            lines.append(f"# {key} = " + " ".join(repr(value) for value in corner.tolist()))
-    return lines + [f"# {key} = {' '.join(value.split())}" for key, value in packing.metadata.items()]
 
 
 def format_rows(packing: Packing, delimiter: str) -> Iterable[str]:

@@ -19,6 +19,7 @@ from porefv.errors import InputError
 from porefv.packing.files.column_names import Column, chosen_columns, roles, spheres
 from porefv.packing.files.content import FileContent, missing_radius
 from porefv.packing.files.frames import chosen_frame
+from porefv.packing.files.length_units import agreed_unit, stated_unit
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, Corners, quoted
 from porefv.packing.files.vtk_legacy import LegacyMesh
@@ -59,6 +60,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         values.append(found[:, None])
     points = np.concatenate(values, axis=1)
     centres, radii, unit, names = spheres(f"{path}", columns, points.astype(np.float64), options)
+    if isinstance(mesh, LegacyMesh):
+        unit = agreed_unit(unit, stated_unit(f"{path}, line 2", mesh.title), options)
     corners = _corners(path, mesh)
     kind = "legacy VTK" if isinstance(mesh, LegacyMesh) else "VTK XML"
     names = {"centres": "points"} | ({"radius": names["radius"]} if "radius" in names else {})

@@ -6,6 +6,7 @@ by looking for the keywords around them.
 
 import re
 from collections.abc import Iterator, Mapping
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,7 @@ class LegacyMesh:
     """
 
     def __init__(self, path: AnyPath, content: bytes):
+        self.title = content.split(b"\n", 2)[1][:256].decode("latin-1").strip() if content.count(b"\n") else ""
         points = re.search(rb"^POINTS +(\d{1,15}) +" + _TYPE + rb" *\r?\n", content, re.MULTILINE)
         if points is None or int(points[1]) == 0:
             raise InputError(f"{path}: no points can be read from it. Is the file damaged?")
@@ -67,7 +69,7 @@ class _Arrays(Mapping[str, NDArray[np.float64]]):
     def __init__(self, path: AnyPath, content: bytes, start: int, end: int, n_points: int):
         self._path, self._content, self._n_points = path, content, n_points
         self._found = {
-            match["name"].decode(): match
+            unquote(match["name"].decode()): match  # VTK writes a blank as %20
             for pattern in (_SCALARS, _FIELD)
             for match in re.compile(pattern, re.MULTILINE).finditer(content, start, end)
         }

@@ -1,7 +1,8 @@
 """Extended XYZ, as OVITO and ASE write it: frames of a line with N, a line of keys, and N lines.
 
 ``Properties=species:S:1:pos:R:3:radius:R:1`` names the columns, ``Lattice="..."`` gives the box from ``Origin="..."``
-or the origin, and ``pbc="T T F"`` says along which axes it is periodic.
+or the origin, and ``pbc="T T F"`` says along which axes it is periodic. Without pbc, a box is periodic along all axes,
+as ASE reads it.
 """
 
 from __future__ import annotations
@@ -11,15 +12,19 @@ import re
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.packing.files.column_names import UNITS, agreed_unit, chosen_columns, positions, spheres
+from porefv.packing.files.column_names import chosen_columns, positions, spheres
 from porefv.packing.files.content import FileContent, LengthUnit, periodicity
 from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
+from porefv.packing.files.length_units import agreed_unit, first_clear, stated_unit
 from porefv.packing.files.options import ReadOptions
+from porefv.packing.files.periodic_words import periodic_axes, stated_axes
 from porefv.packing.files.text import AnyPath, Corners, Rows, quoted, text_lines
 
 _COUNT = re.compile("[0-9]{1,15}")
-_UNIT_KEYS = ("units", "unit", "length_unit", "length_units")
-_KEYS = re.compile(r"(\w+)=(?:\"([^\"]*)\"|(\S+))")
+_KEYS = re.compile(r"(\w+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)'|(\[[^\]]*\]|\S+))")
+_UNIT_KEY = re.compile(r"(?:(?:length|distance)_?units?|units?_?(?:of_?)?lengths?|units?)")
+_PERIODIC_KEY = re.compile(r"pbcs?|periodic(?:ity)?|boundary|boundaries|bcs?|(?:boundary|periodic)_?conditions?")
+_OWN_KEYS = ("properties", "lattice", "origin")
 
 
 def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
@@ -28,7 +33,8 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     starts, sizes, notes = _frames(path, lines)
     chosen = chosen_frame(path, len(starts), options)
     start, size = starts[chosen], sizes[chosen]
-    keys = {match[1].lower(): match[2] or match[3] or "" for match in _KEYS.finditer(lines[start + 1])}
+    keys = {match[1].lower(): match[2] or match[3] or match[4] or "" for match in _KEYS.finditer(lines[start + 1])}
+    others = _KEYS.sub(" ", lines[start + 1]).strip()
     place = f"{path}, line {start + 2}"
     names = _names(place, keys, lines[start + 2])
     columns = chosen_columns(path, start + 2, names, options)
@@ -39,18 +45,41 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
         )
     values, numbers = rows.columns(positions(columns), len(names))
     centres, radii, unit, shown = spheres(place, columns, values, options)
-    stated = next((keys[key] for key in _UNIT_KEYS if key in keys), None)
-    if stated is not None:
-        unit = agreed_unit(unit, LengthUnit(stated, UNITS.get(stated.lower()), place), options)
+    unit = agreed_unit(unit, _unit(place, keys, others, options), options)
     if numbers[-1] == len(lines) and any(column.position == len(names) - 1 for column in columns):
         notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
-    axes = "".join(axis for axis, flag in zip("xyz", keys.get("pbc", "").split(), strict=False) if flag[0] in "T1t")
-    if "lattice" in keys and "pbc" not in keys:
-        notes = (*notes, "Lattice without pbc, read as a box with walls")
     return FileContent(
         "extended XYZ", centres, radii, _corners(place, keys), "Lattice", unit, numbers, shown, chosen, len(starts),
-        periodicity(place, axes, f'pbc="{keys.get("pbc", "")[:20]}"', options), notes,
+        _periodicity(place, keys, others, options), notes,
     )  # fmt: skip
+
+
+def _unit(place: str, keys: dict[str, str], others: str, options: ReadOptions) -> LengthUnit | None:
+    """The unit that a key states, or the text between the keys."""
+    stated: list[LengthUnit | None] = [stated_unit(place, others)]
+    for key, value in keys.items():
+        if _UNIT_KEY.fullmatch(key):
+            stated.append(stated_unit(place, f"units = {value}") or LengthUnit(value, None, place))
+        elif key not in _OWN_KEYS:
+            stated.append(stated_unit(place, f"{key} = {value}"))
+    return first_clear([unit for unit in stated if unit is not None], options)
+
+
+def _periodicity(place: str, keys: dict[str, str], others: str, options: ReadOptions) -> str:
+    stated = {key: value for key, value in keys.items() if _PERIODIC_KEY.fullmatch(key)}
+    for key, value in stated.items():
+        if (axes := periodic_axes(value)) is None:
+            raise InputError(
+                f'{place}: {key}={quoted(value)} is not understood. Write pbc="F F F" for a box with walls, or T for '
+                "each axis along which it is periodic."
+            )
+        if axes:
+            return periodicity(place, axes, f'{key}="{value[:20]}"', options)
+    if axes := stated_axes(others):
+        return periodicity(place, axes, quoted(others), options)
+    if "lattice" in keys and not stated:
+        return periodicity(place, "xyz", 'Lattice without pbc, which stands for pbc="T T T"', options)
+    return ""
 
 
 def _frames(path: AnyPath, lines: list[str]) -> tuple[list[int], list[int], tuple[str, ...]]:

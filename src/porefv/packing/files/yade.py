@@ -2,10 +2,11 @@
 
 from itertools import chain
 
-from porefv.packing.files.text import AnyPath, format_rows, metadata_comments, write_lines
+from porefv.packing.files.metadata import metadata_comments
+from porefv.packing.files.text import AnyPath, format_rows, write_lines
 from porefv.packing.packing import Packing
 
 
 def write(packing: Packing, path: AnyPath) -> None:
     """Write a file that Yade's ymport.textExt reads; it reads back here to the same numbers."""
-    write_lines(path, chain(["#format x_y_z_r"], metadata_comments(packing), format_rows(packing, "\t")))
+    write_lines(path, chain(["#format x_y_z_r"], metadata_comments(packing, path), format_rows(packing, "\t")))
