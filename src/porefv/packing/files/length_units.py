@@ -44,7 +44,7 @@ _WORD = re.compile(r"(?<![^\W_])[^\W\d_]+(?![^\W_]|\^|\*\*)")
 _GLUED = re.compile(r"(?<=\d)[^\W\d_]+(?![^\W_]|\^|\*\*)")  # 5um
 _JOINED = re.compile(r"\b(length|units?)(?=(?:length|unit)s?\b)", re.IGNORECASE)  # UnitLength
 _EXPLICIT = re.compile(
-    r"(?:(?:(?<![^\W_])([^\W\d_]+)[\s_]+)?units?[\"']?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?"
+    r"(?:(?<![^\W_])(?:([^\W\d_]+)[\s_]+)?units?[\"']?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?"
     r"|\b(?:lengths|distances|dimensions)\s+(?:are\s+)?(?:given\s+)?in\s+)"
     r"([^\W\d_]+)(?![\w/^*])",
     re.IGNORECASE,
