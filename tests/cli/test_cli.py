@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from porefv.cli.program import main
@@ -120,10 +121,14 @@ def test_plot_replaces_a_picture_only_on_demand(tmp_path, capsys, monkeypatch):
 
 
 def test_a_warning_is_said_once(write_scene, tmp_path, capsys):
-    rows = (DATA / "packings" / "n25_s1.csv").read_text().splitlines()
-    x, y, z, radius = map(float, rows[-1].split(","))
+    # Each sphere twice, a little apart. With triple overlaps the packing is validated for its porosity, too.
+    rng = np.random.default_rng(1)
+    packing = Packing.read(DATA / "packings" / "n25_s1.csv")
+    moves = rng.normal(size=packing.centres.shape)
+    moves *= 0.03 * packing.radii[:, None] / np.linalg.norm(moves, axis=1)[:, None]
+    moved = np.clip(packing.centres + moves, packing.radii[:, None], 1 - packing.radii[:, None])
     near = tmp_path / "near.csv"
-    near.write_text("\n".join([*rows, f"{x - 0.001 * (x > 0.5)},{y},{z},{radius}", ""]))
+    Packing(np.vstack([packing.centres, moved]), np.tile(packing.radii, 2), packing.box).write(near)
     assert main(["solve", str(write_scene(tmp_path, near))]) == 0
     assert capsys.readouterr().err.count("one sphere lies within another but for less than") == 1
 

@@ -87,6 +87,9 @@ def test_a_comment_that_lists_columns_is_a_header(read, header):
 def test_a_row_of_a_number_and_a_box_is_no_sphere(read):
     with pytest.raises(InputError, match="line 1: '2 1 1 1' may be the number of the rows after it and the sides"):
         read("2 1 1 1\n0.25 0.5 0.5 0.1\n0.75 0.5 0.5 0.1\n")
+    with pytest.raises(InputError, match="line 1: '2.0e0 1 1 1' may be the number of the rows"):
+        read("2.0e0 1 1 1\n0.25 0.5 0.5 0.1\n0.75 0.5 0.5 0.1\n")
+    assert len(read("2 1 1 1\n4 0.5 0.5 0.1\n6 0.5 0.5 0.1\n")) == 3  # whole numbers as the others
     assert len(read("x y z r\n2 1 1 1\n0.25 0.5 0.5 0.1\n0.75 0.5 0.5 0.1\n")) == 3
 
 

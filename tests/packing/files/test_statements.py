@@ -27,7 +27,7 @@ def read(tmp_path):
         "# length unit [mm]", "# lengths in mm", "# all lengths are in mm", "# dimensions in millimetres",
         "## units = mm", "# [mm]", "# mm", "# Unit: mm.", '# units = "mm"', "  # units = mm", "Units: mm",
         "% units = mm", "// units = mm", "; units = mm", "! units = mm", "Length unit,mm", "Units,mm,,", "Unit\tmm",
-        "All lengths in mm", "# made by hand, units = mm", "# UnitLength = mm", "# mm mm mm mm",
+        "All lengths in mm", "# made by hand, units = mm", "# beads units = mm", "# UnitLength = mm", "# mm mm mm mm",
     ],
 )  # fmt: skip
 def test_a_unit_in_words_is_converted(read, line):
@@ -41,7 +41,8 @@ def test_a_unit_in_words_is_converted(read, line):
     [
         "# voxel size = 5 um", "# scale = 1e-3", "# lengthscale: 1 mm", "# coordinates: mm", "# x y z radius in mm",
         "# grains of 3 mm", "# units: mm, m/s", "# units = Mm", "# lengths in Mm", "# velocity units = mm/s",
-        "# lengths in voxels", "# lengths in units of the diameter", "Voxel size,5,um",
+        "# lengths in voxels", "# radius unit: mm", "# length_scale 1e-3", "# spacing = 5e-6",
+        "# lengths in units of the diameter", "Voxel size,5,um",
     ],
 )  # fmt: skip
 def test_words_about_lengths_that_are_not_understood_need_a_scale(read, line):
@@ -71,6 +72,7 @@ def test_statements_must_agree(read):
         ("# periodic = true", "x, y, z"), ("# periodic: xy", "x, y"), ("# boundary = periodic", "x, y, z"),
         ("# pbc = T F T", "x, z"), ("#PERIODIC 1 1 1", "x, y, z"), ("# box_periodic = 0 0 1", "z"),
         ("# periodicity = 1 1 1", "x, y, z"), ("# a periodic packing", "x, y, z"), ("Boundary: pp ff ff", "x"),
+        ("# isPeriodic = 1", "x, y, z"), ("# periodic_y = true", "y"),
         ("# PERIODIC:: 1 1 1", "x, y, z"), ("## PERIODIC:: 1 1 1", "x, y, z"),
     ],
 )  # fmt: skip
@@ -89,6 +91,8 @@ def test_periodic_boundaries_in_words_are_refused_or_ignored(read, line, axes):
         "# periodic = false",
         "# pbc = F F F",
         "# non-periodic",
+        "# non_periodic",
+        "# periodic_x = 0",
         "# boundary = fixed",
         "# boundary layer",
         "# periodicity: none",

@@ -30,6 +30,11 @@ _BESIDE = {
     "stress", "kg", "g", "mg", "t", "tonne", "s", "ms", "sec", "seconds", "min", "h", "n", "kn", "mn", "pa", "kpa",
     "mpa", "gpa", "j", "k", "c", "rad", "deg",
 }  # fmt: skip
+# Words whose unit is not that of all lengths.
+_PARTIAL = {
+    "radius", "radii", "diameter", "diameters", "size", "sizes", "position", "positions", "coordinate", "coordinates",
+    "velocity", "mass", "time", "force", "stress", "pressure", "energy", "volume", "area", "angle", "density",
+}  # fmt: skip
 # Words of files of images, whose lengths may be in voxels.
 _VOXELS = {"voxel", "voxels", "vox", "pixel", "pixels", "px"}
 # Units that are also words or letters of other meanings: in running text they say nothing.
@@ -39,7 +44,7 @@ _WORD = re.compile(r"(?<![^\W_])[^\W\d_]+(?![^\W_]|\^|\*\*)")
 _GLUED = re.compile(r"(?<=\d)[^\W\d_]+(?![^\W_]|\^|\*\*)")  # 5um
 _JOINED = re.compile(r"\b(length|units?)(?=(?:length|unit)s?\b)", re.IGNORECASE)  # UnitLength
 _EXPLICIT = re.compile(
-    r"(?:\bunits?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?"
+    r"(?:(?<![^\W_])(?:([^\W\d_]+)[\s_]+)?units?[\"']?\s*[:=]\s*(?:in\s+(?=\w))?[\"'(\[{]?"
     r"|\b(?:lengths|distances|dimensions)\s+(?:are\s+)?(?:given\s+)?in\s+)"
     r"([^\W\d_]+)(?![\w/^*])",
     re.IGNORECASE,
@@ -50,8 +55,8 @@ _ONLY = re.compile(
     re.IGNORECASE,
 )
 _SCALES = re.compile(
-    r"\b(?:voxel|pixel)[\s_-]*(?:size|length|edge|width|spacing)|\b(?:length[\s_-]*)?scale(?:[\s_-]*factor)?\s*[:=]"
-    r"|\bin units of\b",
+    r"\b(?:voxel|pixel)[\s_-]*(?:size|length|edge|width|spacing)|\bspacing\s*[:=]"
+    r"|\b(?:length[\s_-]*)?(?:scale|scaling)(?:[\s_-]*factor)?(?:\s*[:=]|\s+[0-9.])|\bin units of\b",
     re.IGNORECASE,
 )
 
@@ -94,8 +99,9 @@ def stated_unit(place: str, text: str) -> LengthUnit | None:
     units = [word for word in words if word.lower() in UNITS.keys() - {"in"} or word.lower() in _SYSTEMS]
     sizes = {_size(word) for word in units}
     explicit = _EXPLICIT.search(text)
-    if explicit and (size := _size(explicit[1])) is not None and sizes | {size} == {size}:
-        return LengthUnit(explicit[1], size, place)
+    partial = explicit is not None and explicit[1] is not None and explicit[1].lower() in _PARTIAL
+    if explicit and not partial and (size := _size(explicit[2])) is not None and sizes | {size} == {size}:
+        return LengthUnit(explicit[2], size, place)
     if match := _ONLY.fullmatch(text):
         return LengthUnit(match[1], _size(match[1]), place)
     beside = all(word.lower() in _BESIDE or word in units for word in words)

@@ -12,8 +12,9 @@ _KEY = re.compile(
     r"(?:[\s_]*conditions?)?\s*(?::{1,2}|=|\s)\s*(.*)",
     re.IGNORECASE,
 )
-_SAID = re.compile(r"\b(?:periodic|pbcs?)\b", re.IGNORECASE)
-_DENIED = re.compile(r"\b(?:non|not|no|without)[\s-]*(?:periodic|pbcs?)\b", re.IGNORECASE)
+_ONE_AXIS = re.compile(r"(?:([xyz])[\s_]*)?(?:is[\s_]*)?periodic(?:[\s_]*([xyz]))?\s*[:=]\s*(\w+)", re.IGNORECASE)
+_SAID = re.compile(r"(?<![^\W_])(?:periodic|pbcs?)(?![^\W_])", re.IGNORECASE)
+_DENIED = re.compile(r"(?<![^\W_])(?:non|not|no|without)[\s_-]*(?:periodic|pbcs?)(?![^\W_])", re.IGNORECASE)
 
 
 def periodic_axes(value: str) -> str | None:
@@ -37,7 +38,9 @@ def stated_axes(text: str) -> str | None:
     >>> stated_axes("pbc = T T F"), stated_axes("a periodic packing"), stated_axes("boundary layer")
     ('xy', 'xyz', None)
     """
-    text = text.strip(" \t#%!;/\"'")
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", text.strip(" \t#%!;/\"'"))  # isPeriodic
+    if (match := _ONE_AXIS.fullmatch(text)) and (flag := _flag(match[3].lower())) is not None:
+        return (match[1] or match[2] or "xyz").lower() if flag else ""
     if (match := _KEY.fullmatch(text)) and (axes := periodic_axes(match[1])) is not None:
         return axes
     return "xyz" if _SAID.search(text) and not _DENIED.search(text) else None

@@ -309,8 +309,10 @@ def _is_numbering(values: NDArray) -> bool:
 def _refuse_number_and_box(path: AnyPath, rows: Rows, delimiter: str | None) -> None:
     """Refuse a first row that may be the number of the others and a box: N Lx Ly Lz."""
     first, *others = [split(text, delimiter)[0] for text in rows.texts]
-    whole = re.compile("[0-9]{1,15}")
-    if whole.fullmatch(first) and int(first) == len(others) and not all(map(whole.fullmatch, others)):
+    if not _is_number(first) or float(first) != len(others):
+        return
+    # Where all rows begin with whole numbers, the first is one of them.
+    if not all(_is_number(other) and float(other).is_integer() for other in others):
         raise InputError(
             f"{path}, line {rows.numbers[0]}: {quoted(rows.texts[0])} may be the number of the rows after it and the "
             "sides of a box, or a sphere. Remove the line, and give the box; or name the columns in a header."
