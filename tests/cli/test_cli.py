@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -107,9 +108,8 @@ def test_plot_draws_a_picture(write_scene, tmp_path, capsys):
 
 
 def test_plot_replaces_a_picture_only_on_demand(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(
-        "porefv.results.drawing.draw_packing", lambda packing, name, path: path.write_bytes(b"a new picture")
-    )
+    drawn = SimpleNamespace(notes=(), save=lambda path: path.write_bytes(b"a new picture"))
+    monkeypatch.setattr("porefv.export.pictures.picture", lambda *_, **__: drawn)
     picture = tmp_path / "picture.png"
     picture.write_bytes(b"earlier")
     arguments = ["plot", str(DATA / "packings" / "n25_s1.csv"), "--out", str(picture)]
@@ -162,7 +162,7 @@ def test_vtk_is_imported_only_if_asked_for(write_scene, tmp_path, vtk):
 
 @pytest.mark.parametrize("arguments", [
     ["solve", "missing.toml"], ["check", "missing.toml"], ["info", "missing"],
-    ["plot", "missing", "--out", "a.png"], ["solve"], ["paint"], [],
+    ["plot", "missing", "--out", "a.png"], ["solve"], ["paint"],
     ["solve", "scene.toml", "--threads", "0"], ["plot", "missing"],
 ])  # fmt: skip
 def test_bad_input_is_status_2_and_no_traceback(arguments, tmp_path):

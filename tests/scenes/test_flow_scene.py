@@ -68,7 +68,7 @@ def test_every_key_is_understood():
     scene = FlowScene.read(DATA / "scenes" / "n25.toml")
     assert scene.packing.format == "csv"
     assert scene.box is not None and scene.box.volume == 1.0
-    assert (scene.fluid.viscosity, scene.fluid.density) == (1.0e-3, 1000.0)
+    assert (scene.fluid.viscosity, scene.fluid.density) == (10.0, 970.0)
     assert scene.walls.z_max.pressure == 10.0
     assert list(scene.walls.slip) == [True, False, False, False, False, False]
     assert (scene.mesh.unite_tolerance, scene.mesh.wall_tolerance) == (0.01, 0.05)

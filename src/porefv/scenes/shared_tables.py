@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
-from pydantic import AfterValidator, GetCoreSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import core_schema
 
 from porefv.conductance.model import ConductanceModel
@@ -26,7 +26,9 @@ CONDUCTANCES = ("auto", *MODELS)
 _Condition = TypeVar("_Condition")
 
 
-def _existing(path: Path) -> Path:
+def _existing(path: Path, info: ValidationInfo) -> Path:
+    if (info.context or {}).get("recorded"):  # what was run is no longer read
+        return path
     try:
         if not path.is_file():
             what = "is not a file" if path.exists() else "does not exist"

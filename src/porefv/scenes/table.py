@@ -109,9 +109,20 @@ class Scene(Table):
         return cls._validated(SceneSource(dict(data)), Path(directory), None)
 
     @classmethod
-    def _validated(cls, source: SceneSource, directory: Path, path: Path | None) -> Self:
+    def from_record(cls, data: Mapping[str, Any]) -> Self:
+        """The scene of a run, from the record in its results: its files need not exist any more.
+
+        Raises
+        ------
+        InputError
+            As `read`.
+        """
+        return cls._validated(SceneSource(dict(data)), Path(), None, recorded=True)
+
+    @classmethod
+    def _validated(cls, source: SceneSource, directory: Path, path: Path | None, *, recorded: bool = False) -> Self:
         try:
-            scene = cls.model_validate(source.data, context={"directory": directory})
+            scene = cls.model_validate(source.data, context={"directory": directory, "recorded": recorded})
         except ValidationError as errors:
             raise input_error(errors, source) from None
         scene._path, scene._data = path, source.data

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,18 +14,21 @@ from porefv.errors import InputError, counted
 from porefv.export.picture_output import FORMATS_2D, Picture
 from porefv.export.picture_style import (
     AXIS_COLOURS,
-    PALE_INK,
+    FONTS,
+    INK,
     SIZE,
-    SMALL,
     PictureSize,
     label_in_unit,
     new_figure,
     style,
 )
 from porefv.packing.box import WALLS
+from porefv.scenes.simulation_scene import SimulationScene
+from porefv.simulation.laboratory_tests import AXES, LaboratoryTests, Oedometer, Triaxial
 from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
 from porefv.simulation.series import PROFILES
+from porefv.simulation.stage_axis import StageAxis
 from porefv.system.atomic_files import picture_target
 
 if TYPE_CHECKING:
@@ -34,6 +38,9 @@ if TYPE_CHECKING:
 
 # Moments of which profiles are drawn.
 _MOMENTS = 6
+# Curves of theory, and of total stresses beside those of contacts.
+_THEORY: dict[str, Any] = {"color": INK, "ls": (0, (4, 2)), "lw": 1.0}
+_TOTAL: dict[str, Any] = {"lw": 3.0, "alpha": 0.3}
 
 
 def draw_series(directory: str | PathLike[str], path: str | PathLike[str], **options: Any) -> Picture:
@@ -63,6 +70,9 @@ def series_picture(
 ) -> Figure:
     """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`.
 
+    Over a stage of one-dimensional consolidation there is Terzaghi's solution, and below a triaxial test there are its
+    stresses and strains: see `porefv.simulation.laboratory_tests`.
+
     Parameters
     ----------
     directory : path
@@ -76,29 +86,39 @@ def series_picture(
         raise InputError(f"{directory} has no rows to draw yet")
     wet = "mean_pressure" in (series.dtype.names or ())
     profiles = read_profiles(directory) if (Path(directory) / PROFILES).is_file() else None
+    tests = LaboratoryTests(SimulationScene.from_record(record.scene), record)
+    axis = StageAxis.of(record.spans, tests.dry, float(series["time"][-1]))
+    oedometers, triaxial = tests.oedometers(series), tests.triaxial()
     rows = 2 if wet or profiles is not None else 1
-    size = size or (2000, 700 * rows)
+    all_rows = rows + (triaxial is not None)
+    size = size or (2000, 700 * all_rows)
     with style():
         figure = new_figure(PictureSize(*size, SIZE.dpi if dpi is None else dpi).check(), layout="constrained")
-        axes = iter(np.atleast_1d(figure.subplots(rows, 2)).ravel())
+        grid = figure.add_gridspec(all_rows, 6)
+        panels = (3 if wet else 2) + (profiles is not None)
+        places = [grid[row, left : left + 3] for row in range(rows) for left in (0, 3)]
+        if panels % 2:
+            places[panels - 1] = grid[rows - 1, :]
+        axes = iter([figure.add_subplot(place) for place in places[:panels]])
         if wet:
-            _pressures(next(axes), series)
+            _pressures(next(axes), series, oedometers)
         _stresses(next(axes), series, wet)
-        _strains(next(axes), series)
-        in_time = list(figure.axes[: 3 if wet else 2])
-        for ax in in_time:
-            _stages(ax, record)
-            ax.set_xlim(series["time"][0], max(series["time"][-1], np.nextafter(series["time"][0], np.inf)))
-            label_in_unit(ax.xaxis, "time", series["time"][-1], "s")
+        _strains(next(axes), series, oedometers)
+        for ax in figure.axes[: 3 if wet else 2]:
+            axis.apply(ax)
             ax.grid(alpha=0.3)
             ax.legend()
         if profiles is not None and len(profiles):
-            _profiles(next(axes), profiles, record, "pressure" if wet else "effective_stress")
+            _profiles(next(axes), profiles, record, tests, oedometers)
         for ax in axes:
             ax.set_axis_off()
+        if triaxial is not None:
+            below = [figure.add_subplot(grid[-1, left : left + 2]) for left in (0, 2, 4)]
+            _triaxial(below, triaxial.curves(series), triaxial, record)
         title = Path(record.path).stem if record.path else str(directory)
         text = f"{title}: {counted(len(record.spans), 'stage')}, {series['time'][-1]:.4g} s, {record.status}"
-        figure.suptitle(text, parse_math=False)
+        letters = int(figure.get_figwidth() * 72.0 / (0.6 * FONTS["figure.titlesize"]))
+        figure.suptitle(f"{text}\n{fill(axis.names(), letters)}", parse_math=False)
     return figure
 
 
@@ -108,52 +128,110 @@ def _most(lines: Iterable[Line2D]) -> float:
     return max((float(np.nanmax(size)) for size in sizes if not np.isnan(size).all()), default=0.0)
 
 
-def _pressures(ax: Axes, series: np.ndarray) -> None:
+def _pressures(ax: Axes, series: np.ndarray, oedometers: Sequence[Oedometer]) -> None:
     ax.plot(series["time"], series["mean_pressure"], label="mean")
     ax.plot(series["time"], series["max_pressure"], label="largest")
+    for test in oedometers:
+        times = _dense_times(series, test)
+        ax.plot(times, test.mean_pressure(times), label=_terzaghi(test, "mean"), **_THEORY)
     label_in_unit(ax.yaxis, "pressure of the pores", _most(ax.lines), "Pa")
+
+
+def _dense_times(series: np.ndarray, test: Oedometer) -> np.ndarray:
+    """Times of a stage, close at its begin, where the solution goes with the root of time [s]."""
+    return (
+        test.begin + (series["time"][series["stage"] == test.stage][-1] - test.begin) * np.linspace(0.0, 1.0, 200) ** 2
+    )
+
+
+def _terzaghi(test: Oedometer, what: str) -> str:
+    return f"Terzaghi, {what} ($C_v$ {test.coefficient:.3g} m²/s)"
 
 
 def _stresses(ax: Axes, series: np.ndarray, wet: bool) -> None:
     for wall in WALLS:
-        style: dict[str, Any] = {"color": AXIS_COLOURS[wall[0]], "ls": "-" if wall.endswith("max") else "--"}
-        ax.plot(series["time"], series[f"contact_stress_{wall}"], label=wall, **style)
+        look: dict[str, Any] = {"color": AXIS_COLOURS[wall[0]], "ls": "-" if wall.endswith("max") else "--"}
+        ax.plot(series["time"], series[f"contact_stress_{wall}"], label=wall, **look)
         if wet:
-            ax.plot(series["time"], series[f"total_stress_{wall}"], lw=3.0, alpha=0.3, **style)
+            ax.plot(series["time"], series[f"total_stress_{wall}"], **(look | _TOTAL))
     label_in_unit(ax.yaxis, "stress on walls", _most(ax.lines), "Pa", " (contacts; broad: total)" if wet else "")
 
 
-def _strains(ax: Axes, series: np.ndarray) -> None:
+def _strains(ax: Axes, series: np.ndarray, oedometers: Sequence[Oedometer]) -> None:
     for axis, colour in AXIS_COLOURS.items():
         ax.plot(series["time"], 100.0 * series[f"strain_{axis}"], color=colour, label=f"strain {axis}")
+    for test in oedometers:
+        times = _dense_times(series, test)
+        ax.plot(times, 100.0 * test.strain(times), label=f"Terzaghi, strain {AXES[test.axis]}", **_THEORY)
     ax.set_ylabel("settlement, % of the side")
     ax.invert_yaxis()
 
 
-def _stages(ax: Axes, record: RunRecord) -> None:
-    for span in record.spans[1:]:
-        ax.axvline(span.begin, color="0.6", lw=0.8)
-    for span in record.spans:
-        ax.annotate(
-            f" {span.name}", (span.begin, 0.99), xycoords=("data", "axes fraction"),
-            rotation=90, va="top", fontsize=SMALL, color=PALE_INK, parse_math=False,
-        )  # fmt: skip
+def _profiles(
+    ax: Axes, profiles: np.ndarray, record: RunRecord, tests: LaboratoryTests, oedometers: Sequence[Oedometer]
+) -> None:
+    """Pressure across the layers, effective stress where there is none, at moments of the last stage that has it.
 
-
-def _profiles(ax: Axes, profiles: np.ndarray, record: RunRecord, quantity: str) -> None:
-    """The quantity across the layers, at moments of the last stage that has it: close at first, as it changes then."""
+    The moments are close at first, as it changes then. Walls that hold a pressure are points of the curve.
+    """
+    wet = not np.isnan(profiles["pressure"]).all()
+    quantity = "pressure" if wet else "effective_stress"
     found = profiles[~np.isnan(profiles[quantity])]
     if not len(found):
         ax.set_axis_off()
         return
-    found = found[found["stage"] == found["stage"].max()]
+    number = found["stage"].max()
+    found = found[found["stage"] == number]
+    axis = record.scene.get("output", {}).get("axis", "z")
+    theory = [test for test in oedometers if test.stage == number and AXES[test.axis] == axis]
     times = np.unique(found["time"])
     for time in times[np.unique(np.geomspace(1, len(times), _MOMENTS).round().astype(int)) - 1]:
         layers = found[found["time"] == time]
-        ax.plot(layers[quantity], 0.5 * (layers["lower"] + layers["upper"]), ".-", label=f"{time:.4g} s")
-    stage = record.spans[int(found["stage"][0]) - 1].name
+        values, places = list(layers[quantity]), list(0.5 * (layers["lower"] + layers["upper"]))
+        lower, upper = layers["lower"].min(), layers["upper"].max()
+        pressures = tests.wall_pressures(time) if wet else {}
+        if f"{axis}_min" in pressures:
+            values, places = [pressures[f"{axis}_min"], *values], [lower, *places]
+        if f"{axis}_max" in pressures:
+            values, places = [*values, pressures[f"{axis}_max"]], [*places, upper]
+        (line,) = ax.plot(values, places, ".-", label=f"{time:.4g} s")
+        for test in theory:
+            depth = np.linspace(0.0, 1.0, 101)
+            look = _THEORY | {"color": line.get_color()}
+            ax.plot(test.pressure(depth, time), lower + depth * (upper - lower), **look)
+    stage = record.spans[int(number) - 1].name
     shown = f"{quantity.replace('_', ' ')} by layer"
-    label_in_unit(ax.xaxis, shown, np.nanmax(np.abs(found[quantity])), "Pa", f", in {stage}")
+    remark = f", in {stage}" + ("; dashed: Terzaghi" if theory else "")
+    label_in_unit(ax.xaxis, shown, np.nanmax(np.abs(found[quantity])), "Pa", remark)
     label_in_unit(ax.yaxis, "place across the layers", np.abs(found["upper"]).max(), "m")
     ax.grid(alpha=0.3)
-    ax.legend()
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _triaxial(axes: Sequence[Axes], curves: dict[str, np.ndarray], test: Triaxial, record: RunRecord) -> None:
+    """q over axial strain, the path of stresses, and volume over axial strain, in a colour for each stage."""
+    deviator, path, volume = axes
+    axial, q = 100.0 * curves["axial"], curves["deviator"]
+    for number in range(test.stage, len(record.spans) + 1):
+        (rows,) = np.nonzero(curves["stage"] == number)
+        if not len(rows):
+            continue
+        rows = np.concatenate([rows[:1] - 1, rows]) if rows[0] > 0 else rows
+        name = record.spans[number - 1].name
+        (line,) = deviator.plot(axial[rows], q[rows], label=name)
+        colour = line.get_color()
+        path.plot(curves["effective"][rows], q[rows], color=colour, label=f"{name}, contacts")
+        if not np.isnan(curves["total"][rows]).all():
+            path.plot(curves["total"][rows], q[rows], color=colour, label=f"{name}, total", **_TOTAL)
+        volume.plot(axial[rows], 100.0 * curves["volume"][rows], color=colour, label=name)
+    label_in_unit(deviator.yaxis, "deviatoric stress q", _most(deviator.lines), "Pa")
+    label_in_unit(path.yaxis, "deviatoric stress q", _most(path.lines), "Pa")
+    most = float(np.nanmax(np.abs([curves["effective"], curves["total"]])))
+    label_in_unit(path.xaxis, "mean stress p' (broad: total p)", most, "Pa")
+    volume.set_ylabel("volumetric strain, %")
+    volume.invert_yaxis()
+    for ax in (deviator, volume):
+        ax.set_xlabel(f"strain {AXES[test.axis]} since the shear began, %")
+        ax.legend()
+    for ax in axes:
+        ax.grid(alpha=0.3)
