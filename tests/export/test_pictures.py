@@ -18,7 +18,7 @@ from porefv.packing.packing import Packing
 pyvista = pytest.importorskip("pyvista")
 PACKINGS = Path(__file__).parents[2] / "data" / "packings"
 SMALL = {"size": (400, 300), "dpi": 50}
-IN_3D = ("forces", "pressure", "network", "throats", "packing")
+IN_3D = ("forces", "pressure", "network", "throats", "paths", "packing")
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +116,15 @@ def test_a_network_without_open_throats_says_why():
     assert mesh.throats.closed.all()
     with pytest.raises(InputError, match="of 12 throats none is open"):
         mesh.plot("network", **SMALL)
+
+
+def test_paths_are_those_of_a_flow(flow):
+    assert "200 paths of particles, drawn by flux" in picture(flow, "paths", **SMALL).notes
+    with pytest.raises(InputError, match="needs the paths of a flow"):
+        flow.mesh.plot("paths", **SMALL)
+    walls = Walls(x_min=Wall(pressure=3.0), x_max=Wall(pressure=3.0))
+    with pytest.raises(InputError, match="flow"):
+        PoreFlow(flow.mesh, walls).plot("paths", **SMALL)
 
 
 def test_what_is_left_out_is_said(flow):
@@ -217,7 +226,7 @@ def test_results_are_drawn_at_full_size(flow, tmp_path):
     assert image.dimensions == (1600, 1200, 1)
 
 
-@pytest.mark.parametrize("what", [*IN_3D, "section", "velocity"])
+@pytest.mark.parametrize("what", [what for what in (*IN_3D, "section", "velocity") if what != "paths"])
 def test_results_and_the_flow_have_the_same_picture(flow, tmp_path, what):
     flow = PoreFlow(flow.mesh, flow.walls, Fluid(viscosity=2.0))
     found = results.read(results.write(flow, tmp_path / "results"))

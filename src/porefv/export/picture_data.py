@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from porefv.errors import InputError
+from porefv.flow.paths import Paths
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
 from porefv.mesh.cell_mesh import CellMesh
@@ -24,12 +25,15 @@ NEEDED = {
     "pressure": ("cells", "pressure"),
     "network": ("network",),
     "throats": ("network",),
+    "paths": ("paths",),
     "section": (),
     "velocity": ("cells", "velocity"),
 }
 SHOWN_TOO = {"forces": ("cells", "pressure"), "network": ("pressure", "flux"), "throats": ("flux",),
              "section": ("cells", "pressure")}  # fmt: skip
 KINDS = tuple(NEEDED)
+# Paths of a picture, with a seed that makes it the same each time.
+PATHS = 200
 SECTIONS = ("section", "velocity")  # drawn in a plane
 
 
@@ -79,6 +83,8 @@ class PictureData:
         Of each pore [Pa, m/s].
     flux : (t,) array or None
         Of each throat [m³/s].
+    paths : Paths or None
+        Of particles.
     missing : function
         What to say of a quantity that is needed and is not here.
     """
@@ -93,6 +99,7 @@ class PictureData:
     pressure: np.ndarray | None = None
     velocity: np.ndarray | None = None
     flux: np.ndarray | None = None
+    paths: Paths | None = None
     missing: Callable[[str], str] = "there is no {} to draw".format
 
     @property
@@ -138,6 +145,7 @@ def data_of_flow(flow: PoreFlow, what: str = "forces") -> PictureData:
         "pressure": lambda: flow.pressure,
         "velocity": lambda: flow.pore_velocity,
         "flux": lambda: flow.flux,
+        "paths": lambda: flow.paths(PATHS, seed=1),
     }
     data = PictureData(mesh.packing.centres, mesh.packing.radii, mesh.box, walls=flow.walls_at_pressures)
     return data.with_parts(what, parts)

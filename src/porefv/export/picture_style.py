@@ -28,9 +28,9 @@ FLOW = "#1f5a99"
 BY_NUMBER, BY_WEIGHT = "tab:blue", "tab:orange"
 AXIS_COLOURS = {"x": "tab:green", "y": "tab:orange", "z": "tab:blue"}
 # Colour maps: families that are not taken for one another.
-FORCES, PRESSURES, SPEEDS = "YlOrRd", "viridis", "GnBu"
-# Part of a colour map that is used: ink remains visible on speeds.
-_UP_TO = {SPEEDS: 0.7}
+FORCES, PRESSURES, SPEEDS, TIMES = "YlOrRd", "viridis", "GnBu", "plasma"
+# Part of a colour map that is used: ink remains visible on speeds, and late times on white.
+_UP_TO = {SPEEDS: 0.7, TIMES: 0.85}
 
 FONTS: Any = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.0, "ytick.labelsize": 8.0,

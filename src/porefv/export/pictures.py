@@ -67,7 +67,8 @@ def picture(
     what : str, optional
         One of `KINDS`. In three dimensions: "packing" (grains), "forces" (grains coloured by the force on them, cut
         open to show the pressures), "pressure" (the same with grey grains), "network" (throats as wide as their flux,
-        coloured by pressure), "throats" (as wide as their constrictions, coloured by the mean speed there). In a
+        coloured by pressure), "throats" (as wide as their constrictions, coloured by the mean speed there), "paths"
+        (200 paths of particles, coloured by the time since they entered; of a flow). In a
         plane: "section" (grains as discs, pores coloured by pressure), "velocity" (pores coloured by speed, with
         arrows). By default "forces" of a flow, "section" of a mesh, "packing" of a packing.
     axis, at

@@ -15,10 +15,12 @@ from porefv.export.picture_style import (
     GRAIN_SECTION,
     INK,
     PRESSURES,
+    TIMES,
     Colours,
     in_unit,
 )
 from porefv.export.rendering import View
+from porefv.flow.paths import Paths
 
 TRIANGLES = 1_500_000  # about as many as all balls together may have
 # Grains are translucent around a network of at most so many of them, and left out around a larger one.
@@ -27,6 +29,8 @@ _GRAINS_AROUND_NETWORK = 60
 _WIDEST = 0.3
 # The same relative to the longest side of the box, for boxes of few grains.
 _WIDEST_OF_BOX = 0.04
+# The same of the paths of particles.
+_PATH, _PATH_OF_BOX = 0.05, 0.004
 
 
 class Scene:
@@ -75,12 +79,15 @@ class Scene:
                 self.notes.append("not cut open: there is no pressure in these results")
         elif what == "packing":
             self._add_grains(opened=False, by_force=False)
-        elif self.data.network is not None:
+        else:
             if len(self._radii) <= _GRAINS_AROUND_NETWORK:
                 self._add_grains(opened=False, by_force=False, opacity=0.15)
             else:
                 self.notes.append("grains are left out")
-            self._add_network(self.data.network, what)
+            if self.data.paths is not None:
+                self._add_paths(self.data.paths)
+            elif self.data.network is not None:
+                self._add_network(self.data.network, what)
         self.plotter.add_mesh(
             self.pv.Box(np.stack([-self.view.half, self.view.half], axis=1).ravel()).extract_all_edges(),
             color=INK, line_width=self.line_width, lighting=False,
@@ -201,6 +208,24 @@ class Scene:
         sides = int(np.clip(self.triangles / (4 * len(ends)), 6, 24))
         tubes = lines.tube(scalars="width", absolute=True, n_sides=sides, capping=True)
         self.plotter.add_mesh(tubes, smooth_shading=True, ambient=0.2, specular=0.2, **look)
+
+    def _add_paths(self, paths: Paths) -> None:
+        """Paths as thin tubes, coloured by the time since the particle entered."""
+        most, usual = float(paths.times.max()), float(np.quantile(paths.residence_times, 0.9))
+        # A particle that stays long in a corner would leave one colour to all others.
+        far = most > 1.5 * usual
+        scale = Colours.over("time since entry", "s", 0.0, usual if far else most, TIMES)._replace(beyond=far)
+        self.colours.append(scale)
+        self.notes.append(f"{counted(len(paths), 'path')} of particles, drawn by flux")
+        radius = min(_PATH * float(self._radii.mean()), _PATH_OF_BOX)
+        lines = self.pv.PolyData(self.view.place(paths.points))
+        sizes = np.diff(paths.offsets)
+        lines.lines = np.insert(np.arange(len(paths.points)), paths.offsets[:-1], sizes)
+        lines["time"] = paths.times * scale.unit.factor
+        sides = int(np.clip(self.triangles / (4 * len(paths.points)), 6, 16))
+        tubes = lines.tube(radius=radius, n_sides=sides, capping=True)
+        self.margin = radius
+        self.plotter.add_mesh(tubes, smooth_shading=True, ambient=0.2, specular=0.2, **_by_scalars("time", scale))
 
     # ---- what explains ----------------------------------------------------------------------------------------
 

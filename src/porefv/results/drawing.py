@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     import pyvista
 
 # What `porefv plot --what` draws of results.
-PICTURES = (*pictures.KINDS, *QUANTITY_PICTURES)
+# Results have no paths: they are drawn of a flow.
+PICTURES = (*(kind for kind in pictures.KINDS if kind != "paths"), *QUANTITY_PICTURES)
 
 
 def draw(results: Results, path: str | PathLike[str], what: str | None = None, **options: Any) -> Picture:
