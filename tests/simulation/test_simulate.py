@@ -183,8 +183,8 @@ def test_a_stage_keeps_what_it_does_not_name(path):
     made = []
     original = SimulationScene.grains
 
-    def grains(self):
-        made.append(original(self))
+    def grains(self, packing=None):
+        made.append(original(self, packing))
         return made[-1]
 
     with pytest.MonkeyPatch.context() as patch:
