@@ -112,6 +112,8 @@ class CoupledPressure:
         faces = mesh.wall_faces
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
         self._factor: ApproximateCholesky | SparseFactor | None = None
+        # Of the last solution: what walls yielded, the matrix times 1 in every pore, and the sum of that.
+        self._common: tuple[np.ndarray, np.ndarray, float] | None = None
         self.set_pressures(pressures)
 
     def _of_walls(self, pressures: np.ndarray) -> np.ndarray:
@@ -190,8 +192,11 @@ class CoupledPressure:
                 "smaller contrast of grain sizes, makes it easier"
             )
         # All pores together lose nothing: what a common change of the pressures can mend of that, it mends.
-        common = np.empty(len(x))
-        whole = operator.multiply(np.ones(len(x)), common)
+        if self._common is None or not np.array_equal(self._common[0], wall_mobilities):
+            common = np.empty(len(x))
+            whole = operator.multiply(np.ones(len(x)), common)
+            self._common = wall_mobilities.copy(), common, whole
+        _, common, whole = self._common
         if whole > 0.0:
             shift = float(r.sum()) / whole
             x += shift

@@ -63,8 +63,9 @@ class PairMotion:
         without = self._free.copy()
         without[:, :3] += self._mobilities[:, :3] * forces
         guess = state.pair_velocities - without
-        state.pair_velocities, iterations = self.resistance.solve(without, self._mobilities, guess, tolerance)
-        self.forces = -self.resistance.multiply(state.pair_velocities)
+        state.pair_velocities, self.forces, iterations = self.resistance.solve(
+            without, self._mobilities, guess, tolerance
+        )
         return iterations
 
     @property

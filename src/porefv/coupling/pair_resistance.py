@@ -21,6 +21,7 @@ from porefv.coupling.pair_resistance_kernels import (
     add_blocks,
     add_resistance,
     find_coefficients,
+    invert_blocks,
     solve_for_changes,
 )
 from porefv.errors import ComputationError
@@ -136,7 +137,7 @@ class PairResistance:
 
     def solve(
         self, velocities: np.ndarray, mobilities: np.ndarray, guess: np.ndarray, tolerance: float
-    ) -> tuple[np.ndarray, int]:
+    ) -> tuple[np.ndarray, np.ndarray, int]:
         """u with u = ẋ* - D L u: velocities after a step in which pairs resist those at its end.
 
         Parameters
@@ -153,6 +154,8 @@ class PairResistance:
         Returns
         -------
         u : (n + 6, 6) array
+        forces : (n + 6, 6) array
+            -L u, forces and torques of the pairs [N, N m].
         iterations : int
 
         Raises
@@ -160,11 +163,10 @@ class PairResistance:
         ComputationError
             If it is not reached.
         """
-        free = mobilities > 0.0
-        inertia = np.divide(1.0, mobilities, out=np.zeros_like(mobilities), where=free)
-        changes, room = guess.copy(), np.empty((4, *guess.shape))
+        inertia = np.divide(1.0, mobilities, out=np.zeros_like(mobilities), where=mobilities > 0.0)
+        changes, forces, room = guess.copy(), np.empty_like(guess), np.empty((4, *guess.shape))
         iterations = solve_for_changes(
-            self.pairs, inertia, self._inverses(inertia, free), velocities, changes, room, float(tolerance),
+            self.pairs, inertia, self._inverses(inertia), velocities, changes, forces, room, float(tolerance),
             _MOST_ITERATIONS,
         )  # fmt: skip
         if iterations < 0:
@@ -172,20 +174,14 @@ class PairResistance:
                 f"the velocities of grains that lubrication slows down were not found in {_MOST_ITERATIONS} "
                 "iterations; a larger roughness, a smaller step or a lower viscosity makes it easier"
             )
-        return velocities + changes, iterations
+        return velocities + changes, forces, iterations
 
-    def _inverses(self, inertia: np.ndarray, free: np.ndarray) -> np.ndarray:
+    def _inverses(self, inertia: np.ndarray) -> np.ndarray:
         """(2, n + 6, 3, 3): inverses of the diagonal blocks of D⁻¹ + L, zero in what moves on its own."""
-        changed = self._kept is None or not np.array_equal(self._kept[0][:-6], inertia[:-6])
-        which = slice(None) if changed else slice(-6, None)
-        inverses = np.empty((2, *inertia.shape[:1], 3, 3)) if self._kept is None else self._kept[1]
-        for k in range(2):
-            part = slice(3 * k, 3 * k + 3)
-            block = self._blocks[k, which].copy()
-            block[:, range(3), range(3)] += inertia[which, part] + ~free[which, part]
-            kept = free[which, part]
-            # What moves on its own has no part in its block.
-            block *= (kept[:, :, None] & kept[:, None, :]) | np.eye(3, dtype=bool)
-            inverses[k, which] = np.linalg.inv(block) * (kept[:, :, None] & kept[:, None, :])
-        self._kept = inertia.copy(), inverses
+        if self._kept is None or not np.array_equal(self._kept[0][:-6], inertia[:-6]):
+            first, inverses = 0, np.empty_like(self._blocks)
+        else:
+            first, inverses = len(inertia) - 6, self._kept[1]
+        invert_blocks(first, inertia, self._blocks, inverses)
+        self._kept = inertia, inverses
         return inverses

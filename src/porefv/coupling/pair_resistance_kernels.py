@@ -102,46 +102,58 @@ def add_resistance(pairs, u, lu):
         What the pairs resist with: forces of the fluid on the grains are -L u [N, N m].
     """
     members, normals, arms, normal, tangential, rolling = pairs
-    for c in range(members.shape[0]):
+    count = members.shape[0]
+    c = 0
+    while c < count:
         i = members[c, 0]
-        j = members[c, 1]
-        nx, ny, nz = normals[c, 0], normals[c, 1], normals[c, 2]
-        p, q = arms[c, 0], arms[c, 1]
-        sx = p * u[i, 3] + q * u[j, 3]
-        sy = p * u[i, 4] + q * u[j, 4]
-        sz = p * u[i, 5] + q * u[j, 5]
-        # Velocity of j at the midpoint relative to i there.
-        ux = u[j, 0] - u[i, 0] - (sy * nz - sz * ny)
-        uy = u[j, 1] - u[i, 1] - (sz * nx - sx * nz)
-        uz = u[j, 2] - u[i, 2] - (sx * ny - sy * nx)
-        along = (normal[c] - tangential[c]) * (ux * nx + uy * ny + uz * nz)
-        fx = tangential[c] * ux + along * nx
-        fy = tangential[c] * uy + along * ny
-        fz = tangential[c] * uz + along * nz
-        lu[i, 0] -= fx
-        lu[i, 1] -= fy
-        lu[i, 2] -= fz
-        lu[j, 0] += fx
-        lu[j, 1] += fy
-        lu[j, 2] += fz
-        qx = ny * fz - nz * fy
-        qy = nz * fx - nx * fz
-        qz = nx * fy - ny * fx
-        mx = my = mz = 0.0
-        if rolling[c] > 0.0:
-            mx = u[j, 3] - u[i, 3]
-            my = u[j, 4] - u[i, 4]
-            mz = u[j, 5] - u[i, 5]
-            twist = mx * nx + my * ny + mz * nz
-            mx = rolling[c] * (mx - twist * nx)
-            my = rolling[c] * (my - twist * ny)
-            mz = rolling[c] * (mz - twist * nz)
-        lu[i, 3] -= p * qx + mx
-        lu[i, 4] -= p * qy + my
-        lu[i, 5] -= p * qz + mz
-        lu[j, 3] -= q * qx - mx
-        lu[j, 4] -= q * qy - my
-        lu[j, 5] -= q * qz - mz
+        vx, vy, vz, wx, wy, wz = u[i, 0], u[i, 1], u[i, 2], u[i, 3], u[i, 4], u[i, 5]
+        sum_fx = sum_fy = sum_fz = sum_tx = sum_ty = sum_tz = 0.0
+        while c < count and members[c, 0] == i:  # pairs are sorted by their first
+            j = members[c, 1]
+            nx, ny, nz = normals[c, 0], normals[c, 1], normals[c, 2]
+            p, q = arms[c, 0], arms[c, 1]
+            sx = p * wx + q * u[j, 3]
+            sy = p * wy + q * u[j, 4]
+            sz = p * wz + q * u[j, 5]
+            # Velocity of j at the midpoint relative to i there.
+            ux = u[j, 0] - vx - (sy * nz - sz * ny)
+            uy = u[j, 1] - vy - (sz * nx - sx * nz)
+            uz = u[j, 2] - vz - (sx * ny - sy * nx)
+            along = (normal[c] - tangential[c]) * (ux * nx + uy * ny + uz * nz)
+            fx = tangential[c] * ux + along * nx
+            fy = tangential[c] * uy + along * ny
+            fz = tangential[c] * uz + along * nz
+            sum_fx += fx
+            sum_fy += fy
+            sum_fz += fz
+            lu[j, 0] += fx
+            lu[j, 1] += fy
+            lu[j, 2] += fz
+            qx = ny * fz - nz * fy
+            qy = nz * fx - nx * fz
+            qz = nx * fy - ny * fx
+            mx = my = mz = 0.0
+            if rolling[c] > 0.0:
+                mx = u[j, 3] - wx
+                my = u[j, 4] - wy
+                mz = u[j, 5] - wz
+                twist = mx * nx + my * ny + mz * nz
+                mx = rolling[c] * (mx - twist * nx)
+                my = rolling[c] * (my - twist * ny)
+                mz = rolling[c] * (mz - twist * nz)
+            sum_tx += p * qx + mx
+            sum_ty += p * qy + my
+            sum_tz += p * qz + mz
+            lu[j, 3] -= q * qx - mx
+            lu[j, 4] -= q * qy - my
+            lu[j, 5] -= q * qz - mz
+            c += 1
+        lu[i, 0] -= sum_fx
+        lu[i, 1] -= sum_fy
+        lu[i, 2] -= sum_fz
+        lu[i, 3] -= sum_tx
+        lu[i, 4] -= sum_ty
+        lu[i, 5] -= sum_tz
 
 
 @kernel
@@ -163,7 +175,45 @@ def add_blocks(pairs, moving, turning):
 
 
 @kernel(error_model="numpy")
-def solve_for_changes(pairs, inertia, inverses, velocities, x, room, tolerance, limit):
+def invert_blocks(first, inertia, blocks, inverses):
+    """Fill in the inverses of the diagonal blocks of D⁻¹ + L of rows from `first` on, zero in what moves on its own.
+
+    Parameters
+    ----------
+    first : int
+    inertia : (m, 6) array
+        D⁻¹; zero for what moves on its own.
+    blocks, inverses : (2, m, 3, 3) arrays
+        Of L, of velocities and of spins; and the inverses.
+    """
+    a = np.empty((3, 3))
+    for k in range(first, inertia.shape[0]):
+        for part in range(2):
+            for i in range(3):
+                free = inertia[k, 3 * part + i] > 0.0
+                for j in range(3):
+                    both = free and inertia[k, 3 * part + j] > 0.0
+                    a[i, j] = blocks[part, k, i, j] if both else 0.0
+                a[i, i] += inertia[k, 3 * part + i] if free else 1.0
+            cx = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
+            cy = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
+            cz = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
+            scale = 1.0 / (a[0, 0] * cx + a[0, 1] * cy + a[0, 2] * cz)
+            inverse = inverses[part, k]
+            inverse[0, 0], inverse[1, 0], inverse[2, 0] = scale * cx, scale * cy, scale * cz
+            inverse[0, 1] = scale * (a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2])
+            inverse[1, 1] = scale * (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0])
+            inverse[2, 1] = scale * (a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1])
+            inverse[0, 2] = scale * (a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1])
+            inverse[1, 2] = scale * (a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2])
+            inverse[2, 2] = scale * (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
+            for i in range(3):
+                if inertia[k, 3 * part + i] == 0.0:
+                    inverse[i, i] = 0.0
+
+
+@kernel(error_model="numpy")
+def solve_for_changes(pairs, inertia, inverses, velocities, x, forces, room, tolerance, limit):
     """Solve (D⁻¹ + L) x = -L ẋ* for what moves freely, by preconditioned conjugate gradients; returns the iterations.
 
     Parameters
@@ -175,6 +225,8 @@ def solve_for_changes(pairs, inertia, inverses, velocities, x, room, tolerance, 
         Of the diagonal blocks of D⁻¹ + L, of velocities and of spins; zero in what moves on its own.
     velocities, x : (m, 6) arrays
         ẋ*; the start, and the result [m/s, rad/s].
+    forces : (m, 6) array
+        Filled in: -L (ẋ* + x) [N, N m].
     room : (4, m, 6) array
         To work in.
     tolerance : float
@@ -188,20 +240,20 @@ def solve_for_changes(pairs, inertia, inverses, velocities, x, room, tolerance, 
     int
         -1 where the limit is reached, or numbers are not finite.
     """
-    r, q, aq, z = room[0], room[1], room[2], room[3]
+    r, q, lq, z = room[0], room[1], room[2], room[3]
     m = x.shape[0]
     for k in range(m):
         for a in range(6):
             if inertia[k, a] == 0.0:
                 x[k, a] = 0.0
             q[k, a] = velocities[k, a] + x[k, a]
-    r[:] = 0.0
-    add_resistance(pairs, q, r)
+    lq[:] = 0.0
+    add_resistance(pairs, q, lq)
     for k in range(m):
         for a in range(6):
-            r[k, a] = -r[k, a] - inertia[k, a] * x[k, a] if inertia[k, a] > 0.0 else 0.0
-    rz = _precondition(inverses, r, z)
-    q[:] = z
+            forces[k, a] = -lq[k, a]
+            r[k, a] = forces[k, a] - inertia[k, a] * x[k, a] if inertia[k, a] > 0.0 else 0.0
+    rz = 0.0
     for iteration in range(limit):
         wrong = moving = changed = 0.0
         for k in range(m):
@@ -212,35 +264,27 @@ def solve_for_changes(pairs, inertia, inverses, velocities, x, room, tolerance, 
                     changed += inertia[k, a] * x[k, a] ** 2
         if wrong <= tolerance * tolerance * moving + 1e-10 * changed + 1e-300:
             return iteration
-        _multiply(pairs, inertia, q, aq)
+        before, rz = rz, _precondition(inverses, r, z)
+        turn = rz / before if iteration > 0 else 0.0
+        for k in range(m):
+            for a in range(6):
+                q[k, a] = z[k, a] + turn * q[k, a] if iteration > 0 else z[k, a]
+                lq[k, a] = 0.0
+        add_resistance(pairs, q, lq)
         power = 0.0
         for k in range(m):
             for a in range(6):
-                power += q[k, a] * aq[k, a]
+                power += q[k, a] * (lq[k, a] + inertia[k, a] * q[k, a])
         if not power > 0.0:
             return -1
         along = rz / power
         for k in range(m):
             for a in range(6):
-                x[k, a] += along * q[k, a]
-                r[k, a] -= along * aq[k, a]
-        before = rz
-        rz = _precondition(inverses, r, z)
-        turn = rz / before
-        for k in range(m):
-            for a in range(6):
-                q[k, a] = z[k, a] + turn * q[k, a]
+                forces[k, a] -= along * lq[k, a]
+                if inertia[k, a] > 0.0:
+                    x[k, a] += along * q[k, a]
+                    r[k, a] -= along * (lq[k, a] + inertia[k, a] * q[k, a])
     return -1
-
-
-@helper
-def _multiply(pairs, inertia, q, aq):
-    """aq = (D⁻¹ + L) q, zero in what moves on its own."""
-    aq[:] = 0.0
-    add_resistance(pairs, q, aq)
-    for k in range(q.shape[0]):
-        for a in range(6):
-            aq[k, a] = aq[k, a] + inertia[k, a] * q[k, a] if inertia[k, a] > 0.0 else 0.0
 
 
 @helper
