@@ -191,16 +191,10 @@ class CoupledPressure:
                 f"the pressures of moving pores were not found in {iterations} iterations; a larger tolerance, or a "
                 "smaller contrast of grain sizes, makes it easier"
             )
-        # All pores together lose nothing: what a common change of the pressures can mend of that, it mends.
         if self._common is None or not np.array_equal(self._common[0], wall_mobilities):
             common = np.empty(len(x))
-            whole = operator.multiply(np.ones(len(x)), common)
-            self._common = wall_mobilities.copy(), common, whole
-        _, common, whole = self._common
-        if whole > 0.0:
-            shift = float(r.sum()) / whole
-            x += shift
-            r -= shift * common
+            self._common = wall_mobilities.copy(), common, operator.multiply(np.ones(len(x)), common)
+        _balance(x, rhs, r, *self._common[1:])
         return x, rhs - r, iterations
 
     def is_steady(self, wall_mobilities: np.ndarray) -> bool:
@@ -341,6 +335,44 @@ class _StepOperator:
     def multiply(self, q: np.ndarray, aq: np.ndarray) -> float:
         """aq = (G + E D Eᵀ) q; returns q·aq."""
         return _multiply(self._exchange, self._links, self._mobilities, self._forces, q, aq)
+
+
+@kernel
+def _balance(x, rhs, r, common, whole):
+    """Correct pressures x and residual r by a common change and a common factor, so that Σ r = 0 and x·r = 0.
+
+    All pores together then lose no volume, and the power balances: what is wrong of it is x·r. Among all such changes
+    these make the error least, in the norm of the power.
+
+    Parameters
+    ----------
+    x, rhs, r : (f,) arrays
+        Pressures, right-hand side, and residual.
+    common : (f,) array
+        The matrix times 1 in every pore.
+    whole : float
+        Sum of that.
+    """
+    lost = wrong = along = power = 0.0
+    for i in range(x.shape[0]):
+        product = rhs[i] - r[i]
+        lost += r[i]
+        wrong += x[i] * r[i]
+        along += product
+        power += x[i] * product
+    shift = factor = 0.0
+    determinant = whole * power - along * along
+    if determinant > 1e-10 * abs(whole * power):
+        shift = (power * lost - along * wrong) / determinant
+        factor = (whole * wrong - along * lost) / determinant
+    elif whole > 0.0:  # pressures are all but the same
+        shift = lost / whole
+    elif power > 0.0:  # nothing leaves the box: a common pressure drives nothing
+        factor = wrong / power
+    for i in range(x.shape[0]):
+        product = rhs[i] - r[i]
+        x[i] += shift + factor * x[i]
+        r[i] -= shift * common[i] + factor * product
 
 
 @kernel

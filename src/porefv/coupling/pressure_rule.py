@@ -7,9 +7,9 @@ import numpy as np
 from porefv.solvers.network import Network
 from porefv.system.kernels import helper, kernel
 
-# Bound on the volume still lost, over the tolerance: with 1, a consolidation takes four times the iterations for
-# pressures that are the same within 0.003 of the load.
-_VOLUME = 5.0
+# Bound on the volume still lost by single pores, over the tolerance: with 1, a consolidation takes four times the
+# iterations, for pressures that are the same within 0.003 of the load.
+_VOLUME = 10.0
 # What rounding may leave of the volume rates, relative to the sizes of the terms.
 _ROUNDING = 1e-13
 
@@ -21,7 +21,7 @@ class PressureRule:
     still wrong. Between two estimates the rule takes it to fall with Σ r² / diagonal: applying the preconditioner costs
     most, and may then be spared.
 
-    The volume: Σ|r|, what pores lose or gain unseen, below five times the tolerance of what flows: half of all that
+    The volume: Σ|r|, what pores lose or gain unseen, below ten times the tolerance of what flows: half of all that
     passes the walls of imposed pressure, or half of all that pores exchange, whichever is more. Drag and weight can
     dwarf G in the power: where grains lie under clear fluid, the first alone lets in- and outflow differ by as much as
     they are.
