@@ -101,6 +101,14 @@ class OutOfRangeWarning(PorefvWarning):
     """Much of a flow is in throats of a kind that the conductance model was not tested on."""
 
 
+class InertiaWarning(PorefvWarning):
+    """The inertia of the fluid matters, which a viscous flow leaves out."""
+
+
+class LooseStateWarning(PorefvWarning):
+    """Grains are so far apart that they need resistance of pairs, which is off."""
+
+
 class TransportWarning(PorefvWarning):
     """An equation on the fluid has a term or a condition that mostly is not what is meant."""
 

@@ -60,7 +60,7 @@ packing = {{ file = "{data}/packings/n25_s1.csv", scale = 0.05 }}
 fluid = {{ viscosity = {viscosity}, density = 1000.0 }}
 walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0 }}, lateral = {{ slip = true }} }}
 output = {{ directory = "results/simulation", profiles = 1.0e-4 }}
-coupling = {{ scheme = "{scheme}" }}
+coupling = {{ scheme = "{scheme}", pair_resistance = {pairs} }}
 
 [[stages]]
 name = "dry"
@@ -75,7 +75,11 @@ plates = {{ z_max = {{ stress = 10.0e3, top_speed = 0.5 }} }}
 duration = 1.0e-3
 permeameter = true
 """
-SIMULATIONS = [{"scheme": "implicit-drag", "viscosity": 10.0}, {"scheme": "semi-implicit", "viscosity": 1.0e-3}]
+SIMULATIONS = [
+    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "false"},
+    {"scheme": "semi-implicit", "viscosity": 1.0e-3, "pairs": "false"},
+    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "true"},
+]
 
 
 def run_everything(folder: Path) -> None:

@@ -59,6 +59,15 @@ def outcome_text(record: RunRecord, directory: Path) -> str:
         lines.append(
             f"permeability {found.permeability:.4g} m², porosity {found.porosity:.4f} {found.when} {found.stage}"
         )
+    if record.end_correction:
+        where = ", ".join(f"{wall} by {depth:.3g} m" for wall, depth in record.end_correction.items())
+        lines.append(f"end correction: {where} of the sample more")
+    if record.validity:
+        numbers = record.validity
+        stokes = f", Stokes number at least {numbers['stokes_number']:.3g}" if "stokes_number" in numbers else ""
+        lines.append(
+            f"Reynolds number at most {numbers['reynolds_max']:.3g} (mean {numbers['reynolds_mean']:.3g}){stokes}"
+        )
     if record.status != "complete":
         states = {"running": "running, or killed", "starting": "has only begun"}
         lines.append(f"not complete: {states.get(record.status, record.status)}")

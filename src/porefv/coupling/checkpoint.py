@@ -12,9 +12,12 @@ from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import MODELS, conductance_model
-from porefv.coupling.coupling import Coupling, CouplingSettings, Effort
+from porefv.coupling.coupling import Coupling
+from porefv.coupling.coupling_settings import CouplingSettings, Effort
 from porefv.coupling.coupling_state import CouplingState
 from porefv.dem import checkpoint as grains_checkpoint
 from porefv.dem import state_files
@@ -24,7 +27,7 @@ from porefv.flow.fluid import Fluid
 from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS
 
-FORMAT, VERSION = "porefv.coupling", 2
+FORMAT, VERSION = "porefv.coupling", 3
 
 
 def save(coupling: Coupling, path: str | PathLike[str]) -> None:
@@ -78,6 +81,13 @@ def load(path: str | PathLike[str], conductance: ConductanceModel | None = None)
         prefix = "dem_"
         if header["version"] == 1:
             header, prefix = _renamed(header), "grains_"
+        if header["version"] < 3:  # without pair resistance
+            header["effort"] = _with_pairs(header["effort"])
+            content |= {
+                "pair_centres": np.zeros((0, 3)),
+                "pair_places": np.zeros(0),
+                "pair_velocities": np.zeros((0, 6)),
+            }
         grains = {name.removeprefix(prefix): array for name, array in content.items() if name.startswith(prefix)}
         described = {"name": str(header["conductance"]["name"])} | header["conductance"]
         saved = _of_package(described)
@@ -99,6 +109,11 @@ def _renamed(header: dict[str, Any]) -> dict[str, Any]:
     conductance |= {"parameters": parameters} if conductance["name"] in MODELS else {"class": None}
     numbers = {name: header[name] for name in ("scheme", "drag_number", "fresh")}
     return header | {"conductance": conductance, "settings": header["options"], "numbers": numbers}
+
+
+def _with_pairs(effort: dict[str, Any]) -> dict[str, Any]:
+    """The effort of a file without pair resistance."""
+    return effort | {"seconds": effort["seconds"] | {"pairs": 0.0}}
 
 
 # ---- the conductance model --------------------------------------------------------------------------------------

@@ -6,12 +6,13 @@ adds to them: dt / m for a grain. With D = 0 and velocities of half a step ago t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from porefv.coupling.exchange import Exchange, gather, spread
+from porefv.coupling.power import Power
+from porefv.coupling.pressure_rule import PressureRule, dot
 from porefv.errors import ComputationError
 from porefv.flow.flux import net_outflows, wall_face_fluxes
 from porefv.flow.pressure import held_pressures
@@ -23,7 +24,7 @@ from porefv.solvers.direct import SparseFactor
 from porefv.solvers.network import Network
 from porefv.solvers.pressure_equation import free_network, reached
 from porefv.solvers.solver import Solver
-from porefv.system.kernels import helper, kernel
+from porefv.system.kernels import kernel
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -33,33 +34,6 @@ _LUMPED = 0.3
 _MOST_ITERATIONS = 2000
 # Drag that rules the matrix by this factor takes iterations in hundreds: up to so many unknowns factorise it instead.
 _RULING, _FACTORED = 300.0, 15_000
-
-
-@dataclass(frozen=True)
-class Power:
-    """Where the power of the fluid goes [W].
-
-    Attributes
-    ----------
-    grains, walls : float
-        Work of the fluid on grains and walls, a second.
-    dissipation : float
-        In throats, Σ q² / K.
-    boundary : float
-        Work of the imposed pressures on what flows in.
-    """
-
-    grains: float
-    walls: float
-    dissipation: float
-    boundary: float
-
-    @property
-    def imbalance(self) -> float:
-        """What is lost or made of nothing, relative to the largest."""
-        largest = max(abs(self.grains), abs(self.walls), self.dissipation, abs(self.boundary))
-        lost = self.boundary - self.dissipation - self.grains - self.walls
-        return abs(lost) / largest if largest > 0.0 else 0.0
 
 
 class Links(NamedTuple):
@@ -113,6 +87,8 @@ class CoupledPressure:
         Imposed on walls, NaN where impervious [Pa].
     mobilities : (n,) array
         D of each grain, by row; zero for a step that is explicit in the drag [m/(s N)].
+    layers : (n_pores,) int array, optional
+        Wall whose pressure pores in a clear layer have, -1 for the others (`porefv.coupling.free_surface`).
     """
 
     def __init__(
@@ -122,9 +98,11 @@ class CoupledPressure:
         conductances: np.ndarray,
         pressures: np.ndarray,
         mobilities: np.ndarray,
+        layers: np.ndarray | None = None,
     ):
+        self.layers = np.full(mesh.n_pores, -1) if layers is None else layers
         self.mesh, self.exchange, self.conductances, self.mobilities = mesh, exchange, conductances, mobilities
-        self.free = np.isnan(held_pressures(mesh, pressures))
+        self.free = np.isnan(self._of_walls(pressures))
         number = np.where(self.free, np.cumsum(self.free) - 1, -1).astype(np.int32)
         self._node = number[mesh.cell_pore]
         self._of_free = exchange.between(self._node)
@@ -134,18 +112,24 @@ class CoupledPressure:
         faces = mesh.wall_faces
         self._walls_of_free = np.unique(faces.walls[self._node[faces.cells] >= 0])
         self._factor: ApproximateCholesky | SparseFactor | None = None
+        # Of the last solution: what walls yielded, the matrix times 1 in every pore, and the sum of that.
+        self._common: tuple[np.ndarray, np.ndarray, float] | None = None
         self.set_pressures(pressures)
+
+    def _of_walls(self, pressures: np.ndarray) -> np.ndarray:
+        """(n_pores,): pressure of pores that walls and clear layers hold, NaN elsewhere [Pa]."""
+        inside = np.where(self.layers >= 0, pressures[self.layers], np.nan)
+        return held_pressures(self.mesh, pressures, inside)
 
     def set_pressures(self, pressures: np.ndarray) -> None:
         """Change the pressures (6,) imposed on walls; which walls have one, stays."""
         mesh = self.mesh
         self.wall_pressures = pressures
-        self._held = np.nan_to_num(held_pressures(mesh, pressures))
+        self._held = np.nan_to_num(self._of_walls(pressures))
         pairs = mesh.throats.pores
         self.network, self._inflow = free_network(
             pairs, self.conductances, self._held, self.free, np.zeros(mesh.n_pores)
         )
-        self._weights = 1.0 / self.network.diagonal
         starts, columns = self.network.starts.astype(np.uint32), self.network.columns.astype(np.uint32)
         self._links = Links(starts, columns, self.network.links, self.network.leaks)
         self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
@@ -200,13 +184,17 @@ class CoupledPressure:
             product = np.empty(len(x))
             operator.multiply(x, product)
         r = rhs - product
-        rule = _PowerRule(x, rhs, r, self._weights, tolerance)
+        rule = PressureRule(x, rhs, r, self.network, self._inflow, tolerance)
         iterations, found = preconditioned_cg(operator, self._factor, x, r, rule, _MOST_ITERATIONS, self._room)
         if not found:
             raise ComputationError(
                 f"the pressures of moving pores were not found in {iterations} iterations; a larger tolerance, or a "
                 "smaller contrast of grain sizes, makes it easier"
             )
+        if self._common is None or not np.array_equal(self._common[0], wall_mobilities):
+            common = np.empty(len(x))
+            self._common = wall_mobilities.copy(), common, operator.multiply(np.ones(len(x)), common)
+        _balance(x, rhs, r, *self._common[1:])
         return x, rhs - r, iterations
 
     def is_steady(self, wall_mobilities: np.ndarray) -> bool:
@@ -265,12 +253,38 @@ class CoupledPressure:
 
     def wall_fluxes(self, pressure: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         """(6,): flux into the sample through each wall, grains and walls moving with (n + 6, 3) [m³/s]."""
-        mesh, full = self.mesh, self.full(pressure)
-        i, j = mesh.throats.pores.T
-        outflows = net_outflows(mesh, self.conductances * (full[i] - full[j]))
-        self.exchange.between(mesh.cell_pore).gather(velocities, outflows)  # and the rate at which each pore swells
+        return self._wall_fluxes(self._outflows(pressure, velocities))
+
+    def _outflows(self, pressure: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """(n_pores,): what each pore gives to others, and the rate at which it swells: nothing in free pores [m³/s]."""
+        outflows = net_outflows(self.mesh, self.throat_fluxes(pressure))
+        self.exchange.between(self.mesh.cell_pore).gather(velocities, outflows)
+        return outflows
+
+    def _wall_fluxes(self, outflows: np.ndarray) -> np.ndarray:
+        mesh, inside = self.mesh, self.layers >= 0
         held = ~np.isnan(self.wall_pressures)
-        return np.bincount(mesh.wall_faces.walls, wall_face_fluxes(mesh, outflows, held), 6)
+        of_faces = wall_face_fluxes(mesh, np.where(inside, 0.0, outflows), held)
+        fluxes = np.bincount(mesh.wall_faces.walls, of_faces, 6)
+        return fluxes + np.bincount(self.layers[inside], outflows[inside], 6)
+
+    def throat_fluxes(self, pressure: np.ndarray) -> np.ndarray:
+        """(t,): flux through each throat, from the pressures of the free pores [m³/s]."""
+        full = self.full(pressure)
+        i, j = self.mesh.throats.pores.T
+        return self.conductances * (full[i] - full[j])
+
+    def mass_imbalance(self, pressure: np.ndarray, velocities: np.ndarray) -> float:
+        """What free pores lose or gain unseen, Σ|G p - Q + E ẋ|, over what flows.
+
+        That is half of all that passes walls of imposed pressure, or half of all that free pores exchange with others,
+        whichever is more; 0 where nothing flows.
+        """
+        outflows = self._outflows(pressure, velocities)
+        passed = 0.5 * np.abs(self._wall_fluxes(outflows)).sum()
+        exchanged = 0.5 * np.abs(net_outflows(self.mesh, self.throat_fluxes(pressure))[self.free]).sum()
+        flow = max(passed, exchanged)
+        return float(np.abs(outflows[self.free]).sum() / flow) if flow > 0.0 else 0.0
 
     def power(self, pressure: np.ndarray, velocities: np.ndarray) -> Power:
         """Where the power goes, grains and walls moving with (n + 6, 3)."""
@@ -278,7 +292,7 @@ class CoupledPressure:
         work = (forces * velocities).sum(axis=1)
         full = self.full(pressure)
         i, j = self.mesh.throats.pores.T
-        dissipation = (self.conductances * (full[i] - full[j]) ** 2).sum()
+        dissipation = (self.throat_fluxes(pressure) * (full[i] - full[j])).sum()
         fluxes = self.wall_fluxes(pressure, velocities)
         boundary = np.dot(fluxes, np.nan_to_num(self.wall_pressures))
         return Power(float(work[:-6].sum()), float(work[-6:].sum()), float(dissipation), float(boundary))
@@ -323,26 +337,42 @@ class _StepOperator:
         return _multiply(self._exchange, self._links, self._mobilities, self._forces, q, aq)
 
 
-class _PowerRule:
-    """Stop where the power still wrong is below the tolerance, squared, of the power x·b.
+@kernel
+def _balance(x, rhs, r, common, whole):
+    """Correct pressures x and residual r by a common change and a common factor, so that Σ r = 0 and x·r = 0.
 
-    r·M⁻¹r is the preconditioner's estimate of the power still wrong. Between two estimates the rule takes it to fall
-    with Σ r² / diagonal: applying the preconditioner costs most, and may then be spared.
+    All pores together then lose no volume, and the power balances: what is wrong of it is x·r. Among all such changes
+    these make the error least, in the norm of the power.
+
+    Parameters
+    ----------
+    x, rhs, r : (f,) arrays
+        Pressures, right-hand side, and residual.
+    common : (f,) array
+        The matrix times 1 in every pore.
+    whole : float
+        Sum of that.
     """
-
-    def __init__(self, x: np.ndarray, rhs: np.ndarray, r: np.ndarray, weights: np.ndarray, tolerance: float):
-        self._arrays, self._part = (x, rhs, r, weights), tolerance**2
-        self._power, self._size = _power_and_size(*self._arrays)
-        self._wrong = np.inf
-
-    def met_before(self, rz: float) -> bool:
-        self._wrong = rz
-        return rz <= max(self._part * self._power, 1e-300)
-
-    def met_after(self, iterations: int, lost: float) -> bool:
-        before = self._size
-        self._power, self._size = _power_and_size(*self._arrays)
-        return self._wrong * self._size / before <= self._part * self._power
+    lost = wrong = along = power = 0.0
+    for i in range(x.shape[0]):
+        product = rhs[i] - r[i]
+        lost += r[i]
+        wrong += x[i] * r[i]
+        along += product
+        power += x[i] * product
+    shift = factor = 0.0
+    determinant = whole * power - along * along
+    if determinant > 1e-10 * abs(whole * power):
+        shift = (power * lost - along * wrong) / determinant
+        factor = (whole * wrong - along * lost) / determinant
+    elif whole > 0.0:  # pressures are all but the same
+        shift = lost / whole
+    elif power > 0.0:  # nothing leaves the box: a common pressure drives nothing
+        factor = wrong / power
+    for i in range(x.shape[0]):
+        product = rhs[i] - r[i]
+        x[i] += shift + factor * x[i]
+        r[i] -= shift * common[i] + factor * product
 
 
 @kernel
@@ -389,26 +419,4 @@ def _multiply(exchange, links, mobilities, forces, q, aq):
             total += weights[k] * (q[i] - q[columns[k]])
         aq[i] = total
     gather(exchange, forces, aq)
-    return _dot(q, aq)
-
-
-@helper(fastmath={"reassoc", "contract"})
-def _dot(a, b):
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return total
-
-
-@kernel
-def _power_and_size(x, rhs, r, weights):
-    """|x·b| and Σ w r²."""
-    return abs(_dot(x, rhs)), _weighted_square(r, weights)
-
-
-@helper(fastmath={"reassoc", "contract"})
-def _weighted_square(r, weights):
-    total = 0.0
-    for i in range(r.shape[0]):
-        total += weights[i] * r[i] * r[i]
-    return total
+    return dot(q, aq)

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
 
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
-from porefv.coupling.coupled_pressure import CoupledPressure, Power
+from porefv.coupling.coupled_pressure import CoupledPressure
+from porefv.coupling.coupling_settings import CouplingSettings, Effort
 from porefv.coupling.coupling_state import CouplingState
 from porefv.coupling.end_correction import end_corrected_conductances
-from porefv.coupling.exchange import EXCHANGES, Exchange
-from porefv.dem.grain_model import GrainModel
+from porefv.coupling.exchange import Exchange
+from porefv.coupling.free_surface import clear_layers
+from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
+from porefv.coupling.pair_motion import PairMotion
+from porefv.coupling.pair_resistance import PairResistance
+from porefv.coupling.power import Power
+from porefv.coupling.relative_motion import RelativeMotion
+from porefv.coupling.validity import Validity, validity
+from porefv.dem.grain_model import GrainModel, SpinningGrainModel
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pressure import held_pressures
@@ -24,10 +31,7 @@ from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 from porefv.packing.packing import Packing
-from porefv.system.number_checks import is_finite_number
 from porefv.system.timer import Timer
-
-SCHEMES = ("auto", "implicit-drag", "semi-implicit")
 
 # Drag number up to which `auto` is explicit in the drag, and beyond which an explicit step is refused. It is unstable
 # from 2 on; below 0.1 the error of being explicit is a few parts in a hundred of the fastest drag.
@@ -36,60 +40,14 @@ EXPLICIT, UNSTABLE = 0.1, 1.8
 _ANEW = 1e-8
 # Steps after which products of pressures with the matrix are worked out, not carried on, lest rounding gathers.
 _ANEW_EVERY = 50
+# Tolerance of pairs over that of pressures: with 1 it rules the error of the power, and 0.1 costs a tenth of a step.
+_OF_PAIRS = 0.1
+# Most rounds of pairs and pressures in the first step on a mesh, and the relative change at which they end.
+_ROUNDS, _SETTLED = 30, 1e-3
 # Steps between two looks at how far grains have moved.
 _STRIDE = 10
 # The rows of the walls in arrays of grains and walls.
 _WALL_ROWS = np.arange(-6, 0)
-
-
-@dataclass(frozen=True)
-class CouplingSettings:
-    """How a coupling steps: the parameters of `porefv.coupling.Coupling` of these names."""
-
-    scheme: str = "auto"
-    exchange: str = "facets"
-    tolerance: float = 1e-2
-    renewal: float = 0.02
-    end_correction: bool = True
-
-    def __post_init__(self) -> None:
-        if self.scheme not in SCHEMES:
-            raise InputError(f"unknown scheme {self.scheme!r}; known: {', '.join(SCHEMES)}")
-        if self.exchange not in EXCHANGES:
-            raise InputError(f"unknown exchange {self.exchange!r}; known: {', '.join(EXCHANGES)}")
-        if not 0.0 < self.tolerance < 1.0:
-            raise InputError(f"tolerance must lie between 0 and 1, not {self.tolerance!r}")
-        if not 0.0 < self.renewal <= 1.0:
-            raise InputError(f"renewal must be a part of the mean radius, in (0, 1], not {self.renewal!r}")
-
-
-@dataclass
-class Effort:
-    """What a coupled run has taken.
-
-    Attributes
-    ----------
-    steps, iterations, meshes : int
-        Steps, iterations for pressures, meshes made.
-    seconds : dict
-        Spent on `mesh`, `grains`, `pressure` and `forces`.
-    """
-
-    steps: int = 0
-    iterations: int = 0
-    meshes: int = 0
-    seconds: dict[str, float] = field(
-        default_factory=lambda: {"mesh": 0.0, "grains": 0.0, "pressure": 0.0, "forces": 0.0}
-    )
-
-    def __post_init__(self) -> None:
-        counts = (self.steps, self.iterations, self.meshes)
-        if not all(type(count) is int and count >= 0 for count in counts):
-            raise ValueError(f"steps, iterations and meshes are counts, not {counts}")
-        if {*self.seconds} != {"mesh", "grains", "pressure", "forces"}:
-            raise ValueError(f"the seconds are of {', '.join(self.seconds)}")
-        if not all(is_finite_number(time) for time in self.seconds.values()):
-            raise ValueError("the seconds are no numbers")
 
 
 class Coupling:
@@ -108,27 +66,36 @@ class Coupling:
     scheme : {'auto', 'implicit-drag', 'semi-implicit'}
         `semi-implicit` (C14): pressures from the velocities before the step, forces explicit in it; stable where the
         drag number is below 2. `implicit-drag`: pressures from the velocities after the step; stable at any viscosity.
-        `auto`: the first where the drag number is below 0.1, else the second.
+        `auto`: the first where the drag number is below 0.1 and pairs do not resist, else the second.
     exchange : {'facets', 'volumes'}
         Volume rates and forces, see `porefv.coupling.exchange`.
     tolerance : float
         Bound on the relative error of the pressures in the norm of power, each step.
     renewal : float
-        The mesh is made anew when a grain has moved by this part of the mean radius.
+        The mesh is made anew when one in a hundred neighbours has moved past each other by this part of the mean
+        radius, or any by five times as much, see `porefv.coupling.relative_motion`.
     end_correction : bool
         Whether to correct the drainage height for the looser layer of grains at a drained wall, see
         `porefv.coupling.end_correction`.
+    pair_resistance : bool
+        Whether grains that move past each other meet lubrication and viscous resistance, see
+        `porefv.coupling.pair_resistance`. Loose states need it; in a dense skeleton it is a part in a hundred of the
+        dissipation, and each step costs more.
+    roughness : float
+        Gap, over the mean radius of a pair, below which lubrication grows no more.
 
     Attributes
     ----------
     settings : CouplingSettings
-        Scheme, exchange, tolerance, renewal and end correction.
+        The options above.
     state : CouplingState
         What it holds between two steps, besides its grains.
     mesh : PoreMesh
         The current one.
     equation : CoupledPressure
         The pressure equation on the current mesh.
+    end_depths : (6,) array
+        Depth that the end correction adds at each wall on the current mesh, zero where it does not act [m].
     effort : Effort
 
     Raises
@@ -146,6 +113,7 @@ class Coupling:
     mesh: PoreMesh
     equation: CoupledPressure
     state: CouplingState
+    end_depths: np.ndarray
 
     def __init__(
         self,
@@ -159,11 +127,13 @@ class Coupling:
         tolerance: float = 1e-2,
         renewal: float = 0.02,
         end_correction: bool = True,
+        pair_resistance: bool = False,
+        roughness: float = 0.02,
     ):
         self._set_up(
             grains, walls, fluid if fluid is not None else Fluid(),
             ensure_model(conductance) if conductance is not None else AUTO(),
-            CouplingSettings(scheme, exchange, tolerance, renewal, end_correction),
+            CouplingSettings(scheme, exchange, tolerance, renewal, end_correction, pair_resistance, roughness),
         )  # fmt: skip
         self._make_mesh(Packing(grains.positions, grains.radii, grains.box))
 
@@ -204,6 +174,8 @@ class Coupling:
         if len(state.factor_mobilities):
             coupling.equation.prepare(state.factor_mobilities)
         coupling.state, coupling.effort = state, effort
+        if coupling._pairs is not None:
+            coupling._pairs.restore(state)
         return coupling
 
     def _set_up(
@@ -212,6 +184,11 @@ class Coupling:
         ensure_no_imposed_flow(walls)
         self.grains, self.walls, self.fluid = grains, walls, fluid
         self.conductance, self.settings = conductance, settings
+        if settings.pair_resistance and not isinstance(grains, SpinningGrainModel):
+            raise InputError(
+                "pair_resistance needs grains that spin: a grain model with `spins` and `predict_spins`, and with "
+                "torques in `correct` (porefv.dem.SpinningGrainModel)"
+            )
         self.effort = Effort()
 
     # ---- time ---------------------------------------------------------------------------------------------------
@@ -225,32 +202,73 @@ class Coupling:
             If the motion runs away, or pressures cannot be found.
         """
         for _ in range(steps):
-            if self.effort.steps % _STRIDE == 0 and self._moved() > self.settings.renewal:
+            if self.effort.steps % _STRIDE == 0 and self._relative_motion(self.grains) > self.settings.renewal:
                 self.renew_mesh()
             self._step()
 
     def _step(self) -> None:
+        pairs = self._pairs
         with Timer(self.effort.seconds, "grains"):
-            predicted, wall_speeds, _, wall_mobilities = self.grains.predict()
+            predicted, wall_speeds, mobilities, wall_mobilities = self.grains.predict()
             self._refuse_no_way_out(wall_speeds, wall_mobilities)
             moves = self._moves
-            if self.scheme == "implicit-drag":
-                moves[:-6], moves[-6:] = predicted, self.grains.wall_velocities
-            else:
-                moves[:] = self._velocities()
+            moves[:-6], moves[-6:] = predicted, self.grains.wall_velocities
             moves[_WALL_ROWS, WALL_AXES] = WALL_SENSES * wall_speeds
-        with Timer(self.effort.seconds, "pressure"):
-            iterations = self._find_pressure(moves, wall_mobilities)
+        if pairs is not None:
+            with Timer(self.effort.seconds, "pairs"):
+                if self.effort.steps % _STRIDE == 0:
+                    pairs.look(self.grains, self.state)
+                pairs.begin(self.grains, moves, mobilities, wall_mobilities)
+        if self.scheme == "implicit-drag":
+            self._find_implicit_pressure(moves, wall_mobilities)
+        else:
+            moves[:-6] = self._velocities()[:-6]
+            with Timer(self.effort.seconds, "pressure"):
+                self._find_pressure(moves, wall_mobilities)
+            self._slow_pairs()
         with Timer(self.effort.seconds, "forces"):
             forces = self.equation.forces(self.state.pressure)
+            if pairs is not None:
+                forces += pairs.forces[:, :3]
             thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
         with Timer(self.effort.seconds, "grains"):
-            self.grains.correct(forces[:-6], thrusts)
+            if pairs is None:
+                self.grains.correct(forces[:-6], thrusts)
+            else:
+                assert isinstance(self.grains, SpinningGrainModel)
+                self.grains.correct(forces[:-6], thrusts, pairs.forces[:-6, 3:])
         self.effort.steps += 1
-        self.effort.iterations += iterations
 
-    def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> int:
-        """Find the pressures of a step, and what the next one starts from; returns the number of iterations."""
+    def _find_implicit_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> None:
+        """Find the pressures of a step that is implicit in the drag, and the resistance of pairs before it.
+
+        Pairs resist the velocities under the pressures before, and the pressures change these further: the incremental
+        splitting of projection methods, stable at any step, whose error goes with the change of the pressures. In the
+        first step on a mesh there are none before: rounds of both then converge to the step without splitting.
+        """
+        first, still = self.state.fresh, moves.copy()
+        for _ in range(_ROUNDS if first and self._pairs is not None else 1):
+            before = self.state.pressure
+            self._slow_pairs()
+            if self._pairs is not None:
+                np.add(still, self._pairs.changes[:, :3], out=moves)
+            with Timer(self.effort.seconds, "pressure"):
+                self._find_pressure(moves, wall_mobilities)
+            change = np.abs(self.state.pressure - before)
+            if not first or change.max(initial=0.0) <= _SETTLED * np.abs(before).max(initial=0.0):
+                break
+
+    def _slow_pairs(self) -> None:
+        """What pairs resist with, under the pressures there are."""
+        if self._pairs is not None:
+            with Timer(self.effort.seconds, "pairs"):
+                forces = self.equation.forces(self.state.pressure)
+                self.effort.pair_iterations += self._pairs.resist(
+                    forces, _OF_PAIRS * self.settings.tolerance, self.state
+                )
+
+    def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> None:
+        """Find the pressures of a step, and what the next one starts from."""
         state, equation, tolerance = self.state, self.equation, self.settings.tolerance
         # Half of what the last step changed: all of it would pass its noise on.
         guess, product = state.pressure + 0.5 * state.rate, None
@@ -272,7 +290,7 @@ class Coupling:
             if goes_on:
                 np.subtract(product, before[0], out=state.products[1])
         state.pressure, state.fresh = pressure, False
-        return iterations
+        self.effort.iterations += iterations
 
     def _refuse_no_way_out(self, wall_speeds: np.ndarray, wall_mobilities: np.ndarray) -> None:
         """An incompressible fluid needs an open wall, or one that yields, where others move."""
@@ -288,9 +306,11 @@ class Coupling:
     def set_walls(self, walls: Walls) -> None:
         """Change what walls are to the fluid. Pressures of walls that keep having one may change at every step."""
         ensure_no_imposed_flow(walls)
-        same = (np.isnan(walls.pressures) == np.isnan(self.walls.pressures)).all() and (
-            walls.slip == self.walls.slip
-        ).all()
+        same = (
+            (np.isnan(walls.pressures) == np.isnan(self.walls.pressures)).all()
+            and (walls.slip == self.walls.slip).all()
+            and (walls.free == self.walls.free).all()
+        )
         self.walls = walls
         if same:
             self.equation.set_pressures(walls.pressures)
@@ -299,18 +319,13 @@ class Coupling:
 
     # ---- the mesh -----------------------------------------------------------------------------------------------
 
-    def _moved(self) -> float:
-        """Largest distance a grain has moved since the mesh was made, relative to the mean radius."""
-        way = self.grains.positions - self.mesh.packing.centres
-        return math.sqrt(float((way**2).sum(axis=1).max())) / self._mean_radius
-
     def renew_mesh(self) -> None:
         """Make the mesh anew, with the pressures there were."""
-        around = _mean_by_vertex(self.mesh, self.cell_pressure)
+        around, pair_velocities = _mean_by_vertex(self.mesh, self.cell_pressure), self.state.pair_velocities
         self._make_mesh(Packing(self.grains.positions, self.grains.radii, self.grains.box))
         cells = around[self.mesh.cells].mean(axis=1)
         pores = np.bincount(self.mesh.cell_pore, cells, self.mesh.n_pores) / np.bincount(self.mesh.cell_pore)
-        self.state.pressure = pores[self.equation.free]
+        self.state.pressure, self.state.pair_velocities = pores[self.equation.free], pair_velocities
 
     def _make_mesh(self, packing: Packing) -> None:
         """Make the mesh of a packing, its conductances and its exchange with the grains; pressures are zero."""
@@ -318,24 +333,40 @@ class Coupling:
             grains, slip, pressures = self.grains, self.walls.slip, self.walls.pressures
             mesh = PoreMesh(packing)
             conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
+            reach, self.end_depths = None, np.zeros(6)
+            if self.settings.pair_resistance:
+                narrow = wall_reach(mesh, slip)
+                without = throat_conductances(mesh, self.conductance, np.ones(6, bool), self.fluid.viscosity)
+                conductances = narrow * conductances + (1.0 - narrow) * without
+                conductances *= growth_of_open_throats(mesh)
+                reach = narrow
             if self.settings.end_correction:
-                conductances = end_corrected_conductances(mesh, conductances, pressures)
-            held = ~np.isnan(held_pressures(mesh, pressures))
+                conductances, self.end_depths = end_corrected_conductances(
+                    mesh, conductances, pressures, self.walls.free
+                )
+            layers = clear_layers(mesh, self.walls.free)
+            held = ~np.isnan(held_pressures(mesh, pressures)) | (layers >= 0)
             weights = solid_pressure_weights(mesh, self.conductance, conductances, slip, held)
             exchange = Exchange.of(
                 mesh, self.settings.exchange, slip, grains.rows,
-                split=self.conductance.force_split, solid_pressure=weights,
+                split=self.conductance.force_split, solid_pressure=weights, wall_reach=reach,
             )  # fmt: skip
             drag = np.empty(len(packing))
             drag[grains.rows] = grains.step / grains.masses
             self.equation, scheme, drag_number = self._choose(
-                lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities), drag
+                lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities, layers), drag
             )
             self.mesh = mesh
             self.state = CouplingState.of(packing, int(np.count_nonzero(self.equation.free)), scheme, drag_number)
-            self._mean_radius = float(packing.radii.mean())
+            self._relative_motion = RelativeMotion(mesh)
             self._closed = bool(np.isnan(pressures).all())
             self._moves = np.zeros((len(packing) + 6, 3))
+            self._pairs = None
+            if self.settings.pair_resistance:
+                dragging = ~slip & np.isnan(pressures)
+                self._pairs = PairMotion(mesh, dragging, self.fluid.viscosity, self.settings.roughness, grains.rows)
+                self._pairs.look(grains, self.state)
+                self.state.pair_velocities = np.zeros((len(packing) + 6, 6))
         self.effort.meshes += 1
 
     def _choose(
@@ -346,8 +377,9 @@ class Coupling:
         `equation` is called with the mobilities of the grains: `drag` (n,), or none for a step explicit in the drag.
         """
         asked = self.settings.scheme
-        if asked == "implicit-drag":
-            return equation(drag), asked, None
+        # Pairs are implicit in any case, and only pressures from the velocities after the step conserve the fluid.
+        if asked == "implicit-drag" or (asked == "auto" and self.settings.pair_resistance):
+            return equation(drag), "implicit-drag", None
         explicit = equation(np.zeros_like(drag))
         if explicit.cut_off:
             if asked == "semi-implicit":
@@ -392,12 +424,29 @@ class Coupling:
     @property
     def fluid_forces(self) -> np.ndarray:
         """(n, 3): force of the fluid on each grain over the last step, by id [N]."""
-        return self.equation.forces(self.state.pressure)[:-6][self.grains.rows]
+        return self._forces()[:-6][self.grains.rows]
 
     @property
     def wall_fluid_forces(self) -> np.ndarray:
         """(6, 3): force of the fluid on each wall over the last step [N]."""
-        return self.equation.forces(self.state.pressure)[-6:]
+        return self._forces()[-6:]
+
+    @property
+    def pair_resistance(self) -> PairResistance | None:
+        """L of the pairs on the current mesh, where they resist."""
+        return None if self._pairs is None else self._pairs.resistance
+
+    def _forces(self) -> np.ndarray:
+        """(n + 6, 3): force of the fluid on grains, by row, and walls, of pressures and pairs."""
+        forces = self.equation.forces(self.state.pressure)
+        return forces if self._pairs is None else forces + self._pairs.forces[:, :3]
+
+    @property
+    def fluid_torques(self) -> np.ndarray:
+        """(n, 3): torque of the fluid on each grain over the last step, by id; of pairs alone [N m]."""
+        if self._pairs is None:
+            return np.zeros((len(self.grains.radii), 3))
+        return self._pairs.forces[:-6, 3:][self.grains.rows]
 
     def _velocities(self) -> np.ndarray:
         velocities = np.empty_like(self._moves)
@@ -414,7 +463,26 @@ class Coupling:
     @property
     def power(self) -> Power:
         """Where the fluid's power went over the last step."""
-        return self.equation.power(self.state.pressure, self._velocities())
+        velocities = self._velocities()
+        power = self.equation.power(self.state.pressure, velocities)
+        if self._pairs is None:
+            return power
+        assert isinstance(self.grains, SpinningGrainModel)
+        spins = np.empty_like(self.grains.spins)
+        spins[self.grains.rows] = self.grains.spins
+        grains, walls, pairs = self._pairs.power(velocities, spins, self.state)
+        return replace(power, grains=power.grains + grains, walls=power.walls + walls, pairs=pairs)
+
+    @property
+    def mass_imbalance(self) -> float:
+        """What pores lost or gained unseen over the last step, relative to what flows (`CoupledPressure`)."""
+        return self.equation.mass_imbalance(self.state.pressure, self._velocities())
+
+    @property
+    def validity(self) -> Validity:
+        """Reynolds and Stokes numbers of the last step, which say whether flow without inertia holds."""
+        fluxes = self.equation.throat_fluxes(self.state.pressure)
+        return validity(self.mesh, fluxes, self.grains.velocities, self.fluid, self.walls.slip)
 
     def __repr__(self) -> str:
         return f"Coupling({self.grains!r}, {self.scheme}, {self.mesh.n_pores} pores)"

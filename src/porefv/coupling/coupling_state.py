@@ -38,6 +38,10 @@ class CouplingState:
         Whether the pressures are still to be found on this mesh.
     factor_mobilities : (w,) array
         What walls yielded when the preconditioner was made [m/(s N)]; none before.
+    pair_centres, pair_places : (k, 3), (q,) arrays
+        Of grains, by id, and walls, when the resistance of pairs was last worked out [m]; none without it.
+    pair_velocities : (v, 6) array
+        Velocities and spins of grains, by row, and walls that pairs resisted over the last step [m/s, rad/s].
     """
 
     mesh_centres: Annotated[np.ndarray, ArrayOf("f8", ("n", 3))]
@@ -50,6 +54,9 @@ class CouplingState:
     products: Annotated[np.ndarray, ArrayOf("f8", (2, "g"))]
     fresh: bool
     factor_mobilities: Annotated[np.ndarray, ArrayOf("f8", ("w",))]
+    pair_centres: Annotated[np.ndarray, ArrayOf("f8", ("k", 3))]
+    pair_places: Annotated[np.ndarray, ArrayOf("f8", ("q",))]
+    pair_velocities: Annotated[np.ndarray, ArrayOf("f8", ("v", 6))]
 
     def __post_init__(self) -> None:
         for name, found, most in (
@@ -60,7 +67,10 @@ class CouplingState:
                 raise ValueError(f"{name} is of {found}, not of 0 or {most}")
         if self.scheme not in ("implicit-drag", "semi-implicit"):
             raise ValueError(f"there is no scheme {self.scheme!r}")
-        for name in ("mesh_centres", "mesh_radii", "mesh_box", "pressure", "rate", "products", "factor_mobilities"):
+        for name in (
+            "mesh_centres", "mesh_radii", "mesh_box", "pressure", "rate", "products", "factor_mobilities",
+            "pair_centres", "pair_places", "pair_velocities",
+        ):  # fmt: skip
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} is not finite")
 
@@ -82,7 +92,7 @@ class CouplingState:
         pressure, rate = np.zeros((2, free))
         return cls(
             packing.centres, packing.radii, corners, scheme, drag_number, pressure, rate, np.zeros((2, 0)), True,
-            np.zeros(0),
+            np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 6)),
         )  # fmt: skip
 
     @property

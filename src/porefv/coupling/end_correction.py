@@ -15,11 +15,15 @@ import numpy as np
 from porefv.flow.pressure import held_pressures
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
+from porefv.packing.packing import Packing
 from porefv.solvers.pressure_equation import solve_network
 
 # Taps of the permeameter, as parts of the height, and how many cells between them make a line.
 _TAPS = 0.2, 0.8
 _FEWEST = 200
+# Thickness of the layer at a wall that the sample must reach, in mean diameters, and how much looser it may be than the
+# sample between the taps: grains at a plate are looser by up to 0.1 there.
+_LAYER, _LOOSER = 2.0, 0.15
 # What the flow of the permeameter may fail to conserve, relative to it.
 _CLOSE = 1.0e-6
 
@@ -75,8 +79,33 @@ def permeameter(mesh: PoreMesh, conductances: np.ndarray, axis: int) -> Permeame
     return Permeameter(float(mobility), (float(lower), float(upper)))
 
 
-def end_corrected_conductances(mesh: PoreMesh, conductances: np.ndarray, pressures: np.ndarray) -> np.ndarray:
-    """(t,): conductances with which the pressures of a steady flow reach those of the walls on the walls.
+def reached_walls(packing: Packing) -> np.ndarray:
+    """(6,) bool: walls that the sample reaches, for an end correction to make sense there.
+
+    The porosity of the layer two mean diameters thick along such a wall is at most 0.15 above that between the taps.
+    """
+    assert packing.box is not None  # a mesh has seen to it
+    box, reached = packing.box, np.zeros(6, bool)
+    thick = 2.0 * _LAYER * float(packing.radii.mean())
+    for axis in range(3):
+        lower, size = box.lower[axis], box.size[axis]
+        edges = lower + np.array([[0.0, thick], [size - thick, size], [_TAPS[0] * size, _TAPS[1] * size]])
+        parts = [_solid_between(packing, axis, low, high) / (box.section(axis) * (high - low)) for low, high in edges]
+        reached[2 * axis : 2 * axis + 2] = parts[2] - np.array(parts[:2]) <= _LOOSER
+    return reached
+
+
+def _solid_between(packing: Packing, axis: int, low: float, high: float) -> float:
+    """Volume of the spheres between two planes, overlaps counted twice [m³]."""
+    r, x = packing.radii, packing.centres[:, axis]
+    a, b = (np.clip(plane - x, -r, r) for plane in (low, high))
+    return float((np.pi * (r**2 * (b - a) - (b**3 - a**3) / 3.0)).sum())
+
+
+def end_corrected_conductances(
+    mesh: PoreMesh, conductances: np.ndarray, pressures: np.ndarray, free: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Conductances with which the pressures of a steady flow reach those of the walls on the walls.
 
     The throats behind the pores of a wall that holds a pressure take in series the resistance that some depth has
     within the sample, μ d / k, each on its section across the flow. That depth is found from two flows, as all but
@@ -89,10 +118,25 @@ def end_corrected_conductances(mesh: PoreMesh, conductances: np.ndarray, pressur
         Of the throats [m³/(Pa s)].
     pressures : (6,) array
         Imposed on walls, NaN where impervious [Pa].
+    free : (6,) bool array, optional
+        Walls that are free surfaces, which have no correction. Nor has a wall that the sample does not reach.
+
+    Returns
+    -------
+    conductances : (t,) array
+        [m³/(Pa s)]
+    depths : (6,) array
+        Depth of the sample that the throats behind the pores of each wall resist as; zero without a correction [m].
     """
+    found_depths = np.zeros(6)
+    corrected = ~np.isnan(pressures)
+    if corrected.any():
+        corrected &= reached_walls(mesh.packing)
+    if free is not None:
+        corrected &= ~free
     for axis in range(3):
         walls = np.arange(2 * axis, 2 * axis + 2)
-        drained = ~np.isnan(pressures[walls])
+        drained = corrected[walls]
         found = permeameter(mesh, conductances, axis) if drained.any() else None
         if found is None:
             continue
@@ -103,7 +147,8 @@ def end_corrected_conductances(mesh: PoreMesh, conductances: np.ndarray, pressur
         gained = short - np.where(drained, tried.depths, 0.0)
         depths = np.divide(short**2, gained, out=np.zeros(2), where=gained > 0.0)
         conductances = _resisting(mesh, conductances, walls, depths, found.mobility)
-    return conductances
+        found_depths[walls] = depths
+    return conductances, found_depths
 
 
 def _resisting(

@@ -59,10 +59,11 @@ class SinePressure:
 
 @dataclass(frozen=True)
 class WallHistory:
-    """One wall: its piezometric pressure in time, None where it is impervious, and whether it lets the fluid slip."""
+    """One wall: its piezometric pressure in time, None where impervious; whether it slips, and is a free surface."""
 
     pressure: PressureHistory | None = None
     slip: bool = False
+    free: bool = False
 
 
 class WallHistories:
@@ -87,7 +88,11 @@ class WallHistories:
         """What the walls are at a time [s]."""
         return Walls(
             **{
-                name: Wall(None if history.pressure is None else history.pressure.at(time - since), history.slip)
+                name: Wall(
+                    None if history.pressure is None else history.pressure.at(time - since),
+                    history.slip,
+                    free=history.free,
+                )
                 for name, (history, since) in self._set.items()
             }
         )

@@ -235,7 +235,24 @@ class DEM:
         velocities, speeds, mobilities = free_motion(self._parameters(), state.grains, state.walls, loads)
         return velocities, speeds, mobilities, state.walls.yields
 
-    def correct(self, forces: np.ndarray, thrusts: np.ndarray) -> None:
+    def predict_spins(self) -> tuple[np.ndarray, np.ndarray]:
+        """Spins (n, 3) after the step that `predict` has begun, and dt / I (n,), grain i in row `rows[i]`.
+
+        Returns
+        -------
+        spins (n, 3) array
+            [rad/s]
+        mobilities (n,) array
+            What a torque over the step adds to them [rad/(s N m)].
+        """
+        if not self.halfway:
+            raise InputError("`predict_spins` is for a step that `predict` has begun")
+        grains = self.state.grains
+        mobilities = self.step * grains.inverse_inertia
+        torques = self._contact_loads[0][:, :, 3:].sum(axis=0)
+        return grains.motion[:, 7:10] + mobilities[:, None] * torques, mobilities
+
+    def correct(self, forces: np.ndarray, thrusts: np.ndarray, torques: np.ndarray | None = None) -> None:
         """Take the second half of a step, after `predict`, under forces on grains and walls besides all others.
 
         Parameters
@@ -244,13 +261,19 @@ class DEM:
             On grain i in row `rows[i]`, over this step alone [N].
         thrusts : (6,) array
             On the walls, along their outward normals [N].
+        torques : (n, 3) array, optional
+            On the grains, in the same rows, over this step alone [N m].
         """
         if not self.halfway:
             raise InputError("`correct` ends a step that `predict` has begun")
         self.halfway = False
+        if torques is not None:
+            self._contact_loads[0][0, :, 3:] += torques
         applied = self.state.applied + forces
         self._advance(MOTION, 1, applied, np.asarray(thrusts, float))
         self.state.applied_work += self.step * float((applied * self.state.grains.motion[:, 4:7]).sum())
+        if torques is not None:
+            self.state.applied_work += self.step * float((torques * self.state.grains.motion[:, 7:10]).sum())
 
     def _advance(self, half: int, steps: int, applied: np.ndarray, thrusts: np.ndarray) -> int:
         """Take steps until pairs must be listed anew; returns how many."""

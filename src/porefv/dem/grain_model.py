@@ -83,3 +83,24 @@ class GrainModel(Protocol):
             If the motion runs away.
         """
         ...
+
+
+@runtime_checkable
+class SpinningGrainModel(GrainModel, Protocol):
+    """A grain model whose grains turn: what pair resistance asks for besides."""
+
+    @property
+    def spins(self) -> np.ndarray:
+        """(n, 3): angular velocities at time t - dt/2 [rad/s]."""
+        ...
+
+    def predict_spins(self) -> tuple[np.ndarray, np.ndarray]:
+        """After `predict`: spins (n, 3) that grains would have after the step, and what a torque over it adds (n,).
+
+        The second is dt / I [rad/(s N m)].
+        """
+        ...
+
+    def correct(self, forces: np.ndarray, thrusts: np.ndarray, torques: np.ndarray | None = None) -> None:
+        """As of `GrainModel`, with torques on the grains (n, 3), in the same rows [N m]."""
+        ...

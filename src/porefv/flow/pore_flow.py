@@ -42,7 +42,7 @@ from porefv.flow.reynolds import reynolds_number
 from porefv.flow.sizes import ConstrictionSizes, PoreSizes, constriction_sizes, pore_sizes
 from porefv.flow.tortuosity import hydraulic_tortuosity
 from porefv.flow.velocity import darcy_velocity, pore_velocities
-from porefv.flow.walls import Walls, condition_text, ensure_no_imposed_flow
+from porefv.flow.walls import Walls, condition_text, ensure_no_free_surface, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.packing.packing import Packing
@@ -111,6 +111,7 @@ class PoreFlow(FixedInputs):
         ):
             if not isinstance(given, kinds):
                 raise InputError(f"{what}, not {given!r}")
+        ensure_no_free_surface(walls)
         self.mesh = PoreMesh(mesh) if isinstance(mesh, Packing) else mesh
         self.walls = walls
         self.fluid = fluid if fluid is not None else Fluid()

@@ -41,6 +41,9 @@ class Wall:
         that of a porous plate.
     velocity : float, optional
         Imposed Darcy velocity into the sample [m/s]: the flow is that times the area of the wall.
+    free : bool
+        Whether the wall is a free surface: clear fluid between it and the grains has its pressure, which it needs. For
+        grains that move (`porefv.coupling.Coupling`).
 
     Notes
     -----
@@ -51,6 +54,7 @@ class Wall:
     slip: bool = False
     inflow: float | None = None
     velocity: float | None = None
+    free: bool = False
 
     def __post_init__(self) -> None:
         given = []
@@ -67,6 +71,10 @@ class Wall:
             raise InputError(f"{given[1]} and {given[0]} exclude each other: impose one of them on a wall")
         if not isinstance(self.slip, (bool, np.bool_)):
             raise InputError(f"a wall's slip must be true or false, not {self.slip!r}")
+        if not isinstance(self.free, (bool, np.bool_)):
+            raise InputError(f"a wall's free must be true or false, not {self.free!r}")
+        if self.free and self.pressure is None:
+            raise InputError("a wall that is a free surface needs a pressure, which the clear fluid before it has")
 
     @property
     def imposes_flow(self) -> bool:
@@ -153,6 +161,11 @@ class Walls:
         return np.array([bool(wall.slip) for wall in self])
 
     @property
+    def free(self) -> np.ndarray:
+        """(6,) bool: walls that are free surfaces."""
+        return np.array([bool(wall.free) for wall in self])
+
+    @property
     def imposes_flow(self) -> np.ndarray:
         """(6,) bool: walls of imposed flow."""
         return np.array([wall.imposes_flow for wall in self])
@@ -191,4 +204,14 @@ def ensure_no_imposed_flow(walls: Walls) -> None:
         raise InputError(
             f"{name} has an imposed flow, and its pressure is not known yet: find it with "
             "porefv.flow.solve_imposed_flow, or with PoreFlow, whose walls_at_pressures has it"
+        )
+
+
+def ensure_no_free_surface(walls: Walls) -> None:
+    """InputError if a wall is a free surface, where grains do not move."""
+    if walls.free.any():
+        name = WALLS[int(np.argmax(walls.free))]
+        raise InputError(
+            f"{name} is a free surface, which is for grains that move (porefv simulate): give it a pressure alone, or "
+            "place the wall at the grains"
         )

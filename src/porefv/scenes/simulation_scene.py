@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationInfo, field_validator
 
 from porefv.conductance.model import ConductanceModel
-from porefv.coupling.coupling import SCHEMES
+from porefv.coupling.coupling_settings import SCHEMES
 from porefv.coupling.exchange import EXCHANGES
 from porefv.coupling.walls_in_time import WallHistory
 from porefv.dem.dem import DEM
@@ -69,10 +69,20 @@ class CouplingTable(ConductanceTable):
     )
     tolerance: Fraction = key("bound on the relative error of the pressures at each step, between 0 and 1", 1.0e-2)
     renewal: Annotated[float, Limits("must lie in (0, 1]", above=0.0, most=1.0)] = key(
-        "part of the mean radius, in (0, 1], by which a grain moves until the mesh is made anew", 0.02
+        "part of the mean radius, in (0, 1], by which one in a hundred neighbours move past each other, or any by five "
+        "times as much, until the mesh is made anew",
+        0.02,
     )
     end_correction: bool = key(
         "whether to correct the drainage height for the looser layer of grains at a drained wall", True
+    )
+    pair_resistance: bool = key(
+        "whether grains that move past each other meet [resistance and lubrication](coupling.md#loose-states). Needed "
+        "where grains are apart; in a dense skeleton it changes little and each step costs more",
+        False,
+    )
+    roughness: Annotated[float, Limits("must lie in [1e-6, 0.2]", least=1e-6, most=0.2)] = key(
+        "gap between two grains, as a part of their mean radius, below which lubrication grows no more", 0.02
     )
 
     def make(self) -> CouplingOptions:

@@ -85,9 +85,16 @@ class WallInTimeTable(Table):
     slip: bool = key(
         "whether the fluid slips along the wall, as along a plane of symmetry. If not, the wall drags it", False
     )
+    free: bool = key(
+        "whether the wall is a [free surface](coupling.md#free-surface): clear fluid between it and the grains has its "
+        "pressure, which is then required. Not for `lateral`",
+        False,
+    )
 
     def make(self) -> WallHistory:
-        return WallHistory(self.pressure, self.slip)
+        if self.free and self.pressure is None:
+            raise refused("a free surface needs a pressure, which the clear fluid before it has", "free")
+        return WallHistory(self.pressure, self.slip, self.free)
 
 
 class StageWallsTable(SixWalls[Annotated[WallHistory, MadeFrom(WallInTimeTable)]]):

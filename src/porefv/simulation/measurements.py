@@ -16,7 +16,7 @@ from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
 
 _ENERGIES = ("kinetic", "elastic", "potential", "sliding", "damping", "walls", "applied", "balance")
-_POWERS = ("grains", "walls", "dissipation", "boundary", "imbalance")
+_POWERS = ("grains", "walls", "dissipation", "boundary", "pairs", "imbalance", "weight", "error")
 
 
 def _by_wall(name: str) -> tuple[str, ...]:
@@ -32,7 +32,8 @@ GRAIN_COLUMNS = (
 FLUID_COLUMNS = (
     *_by_wall("fluid_force"), *_by_wall("total_stress"), *_by_wall("flux"),
     "mean_pressure", "max_pressure",
-    *(f"power_{name}" for name in _POWERS), "iterations", "meshes",
+    *(f"power_{name}" for name in _POWERS), "mass_imbalance",
+    "reynolds_max", "reynolds_mean", "stokes_number", "iterations", "meshes",
 )  # fmt: skip
 PROFILE_COLUMNS = ("step", "time", "stage", "layer", "lower", "upper", "pressure", "effective_stress")
 
@@ -71,7 +72,10 @@ def fluid_row(coupling: Coupling, dem: DEM) -> dict[str, float]:
     row |= {f"flux_{wall}": flux for wall, flux in fluxes.items()}
     row |= {"mean_pressure": float((pressure * volumes).sum() / volumes.sum()), "max_pressure": float(pressure.max())}
     row |= {f"power_{name}": value for name, value in asdict(power).items()}
-    row |= {"power_imbalance": power.imbalance}
+    weight = float(((dem.masses[:, None] * dem.gravity + dem.applied) * dem.velocities).sum())
+    error = power.lost / abs(weight) if weight != 0.0 else np.nan
+    row |= {"power_imbalance": power.imbalance, "power_weight": weight, "power_error": error}
+    row |= {"mass_imbalance": coupling.mass_imbalance} | asdict(coupling.validity)
     return row | {"iterations": coupling.effort.iterations, "meshes": coupling.effort.meshes}
 
 
@@ -160,6 +164,10 @@ def profile_rows(dem: DEM, coupling: Coupling | None, axis: int, layers: int) ->
         # Pressures are those at the Laguerre vertices, of which some lie a little beyond the walls.
         places = np.clip(mesh.vertices[:, axis], edges[0], edges[-1])
         pressures = layer_means(places, coupling.cell_pressure, mesh.cell_volumes, edges)
+        # A layer of clear fluid may be thinner than its cells, and hold no vertex.
+        for k in np.flatnonzero(np.isnan(pressures)):
+            nearest = np.argmin(np.abs(places - 0.5 * (edges[k] + edges[k + 1])))
+            pressures[k] = coupling.cell_pressure[nearest]
     stresses = layer_stresses(dem, axis, edges)
     return [
         {

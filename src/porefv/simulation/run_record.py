@@ -115,6 +115,10 @@ class RunRecord:
     checkpoint : CheckpointRecord or None
     reading : dict or None
         What was understood of the packing file, as plain data of `porefv.packing.reading.Reading`.
+    end_correction : dict
+        Depth that the end correction added at each wall where it acted, at the last row of the series [m].
+    validity : dict
+        Largest `reynolds_max` and `reynolds_mean` and least `stokes_number` of the rows of the series.
     """
 
     scene: dict[str, Any]
@@ -126,6 +130,8 @@ class RunRecord:
     seconds: float = 0.0
     checkpoint: CheckpointRecord | None = None
     reading: dict[str, Any] | None = None
+    end_correction: dict[str, float] = field(default_factory=dict)
+    validity: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         must(self.status in STATUSES, f"no run is {self.status!r}")

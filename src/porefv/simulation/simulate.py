@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -15,9 +16,10 @@ import numpy as np
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.walls_in_time import WallHistories
 from porefv.dem.dem import DEM
-from porefv.errors import FORCE_OPTION, ComputationError, InputError, printable
+from porefv.errors import FORCE_OPTION, ComputationError, InertiaWarning, InputError, LooseStateWarning, printable
 from porefv.export.vtk_files import vtk_data_model
 from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALLS
 from porefv.packing.overlaps import sphere_volumes
 from porefv.packing.packing import Packing
 from porefv.scenes.simulation_scene import AXES, ROW_STEPS, ROWS, SimulationScene
@@ -48,6 +50,8 @@ from porefv.system.tables import check_table_format
 _STRIDE = 100
 # Steps after which grains that are not at rest will not be, as for `DEM.run_to_rest`.
 _MOST = 200_000
+# Porosity beyond which grains do not make a skeleton, and need the resistance of pairs.
+_LOOSE = 0.55
 
 
 def run(scene: SimulationScene, *, force: bool = False, resume: bool = False, progress: Progress | None = None) -> Path:
@@ -226,6 +230,7 @@ class _Run:
         self.directory = scene.output.directory
         self.asked_to_stop = 0  # the signal that did
         self._clock = time.perf_counter() - record.seconds
+        self._warned: set[int] = set()  # stages of which a warning has been given
         self._saved = dem.steps, time.perf_counter()
         self._axis = AXES.index(scene.output.axis)
         self._walls = WallHistories()
@@ -301,6 +306,12 @@ class _Run:
         # Pressures are piezometric: the hydrostatic part of the fluid's force is that on the volume of a grain.
         volumes = sphere_volumes(dem.radii)
         dem.apply(-fluid.density * volumes[:, None] * dem.gravity)
+        if dem.porosity > _LOOSE and not options.parameters.get("pair_resistance"):
+            warnings.warn(
+                f"the porosity is {dem.porosity:.2f}, and pair_resistance is off: grains that move past each other "
+                "meet next to no resistance, and move too fast. Set pair_resistance = true in [coupling]",
+                LooseStateWarning, stacklevel=2,
+            )  # fmt: skip
         self.coupling = Coupling(dem, walls, fluid, options.conductance, **options.parameters)
 
     def _follow(self, k: int) -> None:
@@ -390,12 +401,29 @@ class _Run:
             numbers = measurements.grain_row(dem, coupling, np.array(self.record.box), residual)
             if coupling is not None:
                 numbers |= measurements.fluid_row(coupling, dem)
+                self._note_validity(k, coupling)
             self._series.add(numbers | {"stage": k + 1})
         if self._profiles is not None and self._profile_times.due(dem.steps, ended):
             for layer in measurements.profile_rows(dem, coupling, self._axis, self.scene.output.layers):
                 self._profiles.add(layer | {"stage": k + 1})
         if self._frames is not None and self._frame_times.due(dem.steps, ended):
             self._frames.write(dem, coupling, self._walls.at(dem.time).slip)
+
+    def _note_validity(self, k: int, coupling: Coupling) -> None:
+        """Note where the end correction acts and the extremes of the numbers of validity; warn once a stage."""
+        found, record = coupling.validity, self.record
+        record.end_correction = {
+            wall: float(depth) for wall, depth in zip(WALLS, coupling.end_depths, strict=True) if depth > 0.0
+        }
+        noted = record.validity
+        for name, choose in (("reynolds_max", max), ("reynolds_mean", max), ("stokes_number", min)):
+            value = getattr(found, name)
+            if math.isfinite(value):
+                noted[name] = choose(noted.get(name, value), value)
+        if found.warning is not None and k not in self._warned:
+            self._warned.add(k)
+            said = f"stage '{self.scene.stages[k].name}' at {self.dem.time:.4g} s: {found.warning}"
+            warnings.warn(said, InertiaWarning, stacklevel=2)
 
     def _measure_permeability(self, k: int, when: str) -> None:
         found = measurements.permeability(

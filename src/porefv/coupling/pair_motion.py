@@ -1,0 +1,91 @@
+"""PairMotion: the resistance of pairs within the steps of a coupling, by grains and walls whose forces are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from porefv.coupling.coupling_state import CouplingState
+from porefv.coupling.pair_resistance import PairLaw, PairResistance
+from porefv.dem.grain_model import GrainModel, SpinningGrainModel
+from porefv.mesh.pore_mesh import PoreMesh
+from porefv.packing.box import WALL_AXES
+
+# The rows of the walls in arrays of grains and walls.
+_WALL_ROWS = np.arange(-6, 0)
+
+
+class PairMotion:
+    """Velocities after a step in which pairs resist, and the forces and torques with which they do.
+
+    Parameters
+    ----------
+    mesh : PoreMesh
+    dragging : (6,) bool array
+        Walls that drag the fluid.
+    viscosity : float
+        [Pa s]
+    roughness : float
+        Gap below which lubrication grows no more, over the mean radius of a pair [-].
+    rows : (n,) int array
+        Row of each grain in the other arrays.
+
+    Attributes
+    ----------
+    resistance : PairResistance
+    forces : (n + 6, 6) array
+        Forces and torques of the pairs on grains and walls, by row, over the last step [N, N m].
+    """
+
+    def __init__(self, mesh: PoreMesh, dragging: np.ndarray, viscosity: float, roughness: float, rows: np.ndarray):
+        self.resistance = PairResistance(mesh, dragging, PairLaw(viscosity, roughness), rows)
+        self._free, self._mobilities, self.forces = np.zeros((3, mesh.n_spheres + 6, 6))
+
+    def look(self, grains: GrainModel, state: CouplingState) -> None:
+        """Work out the coefficients for grains and walls where they are, and note these places."""
+        state.pair_centres, state.pair_places = np.array(grains.positions), np.array(grains.box.wall_places)
+        self.resistance.set_positions(state.pair_centres, grains.radii, state.pair_places)
+
+    def restore(self, state: CouplingState) -> None:
+        """Go on from a state: its coefficients, and the forces of its last step."""
+        self.resistance.set_positions(state.pair_centres, state.mesh_radii, state.pair_places)
+        self.forces = -self.resistance.multiply(state.pair_velocities)
+
+    def begin(self, grains: GrainModel, moves: np.ndarray, mobilities: np.ndarray, wall_mobilities: np.ndarray) -> None:
+        """Take in what grains and walls would do in a step without the fluid: see `GrainModel.predict`."""
+        assert isinstance(grains, SpinningGrainModel)
+        spins, turning = grains.predict_spins()
+        self._free[:, :3], self._free[:-6, 3:] = moves, spins
+        self._mobilities[:-6, :3], self._mobilities[:-6, 3:] = mobilities[:, None], turning[:, None]
+        self._mobilities[_WALL_ROWS, WALL_AXES] = wall_mobilities
+
+    def resist(self, forces: np.ndarray, tolerance: float, state: CouplingState) -> int:
+        """Find the forces of pairs where the fluid presses with forces (n + 6, 3); returns the number of iterations."""
+        without = self._free.copy()
+        without[:, :3] += self._mobilities[:, :3] * forces
+        guess = state.pair_velocities - without
+        state.pair_velocities, self.forces, iterations = self.resistance.solve(
+            without, self._mobilities, guess, tolerance
+        )
+        return iterations
+
+    @property
+    def changes(self) -> np.ndarray:
+        """(n + 6, 6): what pairs add to velocities and spins of the step [m/s, rad/s]."""
+        return self._mobilities * self.forces
+
+    def power(self, velocities: np.ndarray, spins: np.ndarray, state: CouplingState) -> tuple[float, float, float]:
+        """Work of the pairs on grains and on walls, and what they dissipate, a second [W].
+
+        Parameters
+        ----------
+        velocities : (n + 6, 3) array
+            Of grains, by row, and walls over the last step [m/s].
+        spins : (n, 3) array
+            Of grains, by row [rad/s].
+        state : CouplingState
+            After the step.
+        """
+        work = (self.forces[:, :3] * velocities).sum(axis=1)
+        turning = float((self.forces[:-6, 3:] * spins).sum())
+        dissipated = -float((self.forces * state.pair_velocities).sum())
+        return float(work[:-6].sum()) + turning, float(work[-6:].sum()), dissipated
