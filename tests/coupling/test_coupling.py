@@ -193,6 +193,15 @@ def test_momentum_and_volume_and_power_balance_at_each_step(sample):
         assert coupling.power.imbalance < 1e-9
 
 
+def test_a_closed_vessel_has_no_pressure_but_what_moves_its_fluid(reference):
+    """Where a common pressure drives nothing, its level is free: it must not come from rounding."""
+    dem = DEM(reference("n54_s1"), Material(15e6, 0.5, 30.0, 2600.0), gravity=(0.0, 0.0, -9.81))
+    coupling = Coupling(dem, SEALED, Fluid(1.0))
+    for _ in range(5):
+        coupling.run(5)
+        assert np.abs(coupling.pressure).max() <= 10.0 * np.ptp(coupling.pressure)
+
+
 def test_an_undrained_sample_bears_an_isotropic_load_in_its_pressure(sample):
     # An incompressible fluid lets nothing through to the grains: p = Δσ everywhere, contacts as before.
     plates = {wall: Plate(stress=3e3, top_speed=0.05) for wall in ("x_max", "y_max", "z_max")}
