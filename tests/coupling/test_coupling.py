@@ -202,6 +202,15 @@ def test_a_closed_vessel_has_no_pressure_but_what_moves_its_fluid(reference):
         assert np.abs(coupling.pressure).max() <= 10.0 * np.ptp(coupling.pressure)
 
 
+@pytest.mark.parametrize("walls", [
+    {"z_min": {"pressure": 0.0}, "z_max": {"pressure": 0.0}}, {"z_max": {"pressure": 0.0, "free": True}},
+])  # fmt: skip
+def test_walls_that_hold_every_pore_are_refused(walls):
+    dem = DEM(Packing([[0.5, 0.5, 0.5]], [0.05], Box([0, 0, 0], [1, 1, 1])), gravity=(0.0, 0.0, -9.81))
+    with pytest.raises(InputError, match=r"each of 8 pores is imposed by a wall"):
+        Coupling(dem, Walls.from_mapping(walls), Fluid(1.0)).run(1)
+
+
 def test_an_undrained_sample_bears_an_isotropic_load_in_its_pressure(sample):
     # An incompressible fluid lets nothing through to the grains: p = Δσ everywhere, contacts as before.
     plates = {wall: Plate(stress=3e3, top_speed=0.05) for wall in ("x_max", "y_max", "z_max")}

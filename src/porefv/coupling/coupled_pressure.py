@@ -13,7 +13,7 @@ import numpy as np
 from porefv.coupling.exchange import Exchange, gather, spread
 from porefv.coupling.power import Power
 from porefv.coupling.pressure_rule import PressureRule, dot
-from porefv.errors import ComputationError
+from porefv.errors import ComputationError, InputError, counted
 from porefv.flow.flux import net_outflows, wall_face_fluxes
 from porefv.flow.pressure import held_pressures
 from porefv.mesh.pore_mesh import PoreMesh
@@ -91,6 +91,11 @@ class CoupledPressure:
         D of each grain, by row; zero for a step that is explicit in the drag [m/(s N)].
     layers : (n_pores,) int array, optional
         Wall whose pressure pores in a clear layer have, -1 for the others (`porefv.coupling.free_surface`).
+
+    Raises
+    ------
+    InputError
+        If walls hold the pressure of every pore.
     """
 
     def __init__(
@@ -105,6 +110,11 @@ class CoupledPressure:
         self.layers = np.full(mesh.n_pores, -1) if layers is None else layers
         self.mesh, self.exchange, self.conductances, self.mobilities = mesh, exchange, conductances, mobilities
         self.free = np.isnan(self._of_walls(pressures))
+        if not self.free.any():
+            raise InputError(
+                f"the pressure of each of {counted(mesh.n_pores, 'pore')} is imposed by a wall: nothing is left that "
+                "could resist the grains. Take more grains, or fewer walls with a pressure"
+            )
         number = np.where(self.free, np.cumsum(self.free) - 1, -1).astype(np.int32)
         self._node = number[mesh.cell_pore]
         self._of_free = exchange.between(self._node)
