@@ -9,6 +9,8 @@ import pytest
 import porefv
 
 ROOT = Path(__file__).parent
+# ParaView's own Python runs it.
+collect_ignore = ["src/porefv/export/paraview/show.py"]
 
 
 @pytest.fixture(autouse=True)

@@ -209,6 +209,15 @@ def test_interruption_is_status_130(scene, capsys, monkeypatch):
     assert [path.name for path in scene.parent.iterdir()] == ["scene.toml"]
 
 
+def test_an_interruption_while_text_is_decoded_says_no_word_of_codecs(scene, capsys, monkeypatch):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt("decoding with 'utf-8-sig' codec failed (KeyboardInterrupt: )") from KeyboardInterrupt()
+
+    monkeypatch.setattr(FlowScene, "pore_flow", interrupt)
+    assert main(["solve", str(scene)]) == 130
+    assert capsys.readouterr().err == "porefv: error: interrupted; nothing was written\n"
+
+
 @pytest.mark.parametrize(
     ("error", "said"), [(ZeroDivisionError("0"), "defect of porefv"), (MemoryError(), "not enough memory")]
 )

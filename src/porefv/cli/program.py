@@ -78,13 +78,15 @@ def _failed(error: BaseException, signals: Sequence[int] = ()) -> int:
     if signals and not isinstance(error, KeyboardInterrupt | Terminated | PorefvError):
         # Libraries turn one that comes while they load, or hand arrays over, into errors of their own.
         error = Terminated() if signals[0] == signal.SIGTERM else KeyboardInterrupt()
+    # Where one comes while text is decoded, Python replaces its message, and names the first as the cause.
+    ours = str(error) if error.__cause__ is None else ""
     match error:
         case PorefvError():
             return _fail(str(error), error.exit_status)
         case KeyboardInterrupt():
-            return _fail(str(error) or "interrupted; nothing was written", 130)
+            return _fail(ours or "interrupted; nothing was written", 130)
         case Terminated():
-            return _fail(str(error) or "terminated; nothing was written", 143)
+            return _fail(ours or "terminated; nothing was written", 143)
         case BrokenPipeError():
             return 0  # whoever read our output has gone (porefv info results | head)
         case ModuleNotFoundError():
