@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.flow.fluid import Fluid
+from porefv.flow.reynolds import WARNED
 from porefv.mesh.pore_mesh import PoreMesh
 
-# Beyond the first, and below the second, the inertia of the fluid matters.
-REYNOLDS, STOKES = 1.0, 1.0
+# Below it the inertia of the fluid matters; above `WARNED` of the Reynolds number, too.
+STOKES = 1.0
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Validity:
     def warning(self) -> str | None:
         """What is to be said where inertia matters; None elsewhere."""
         said = []
-        if self.reynolds_max > REYNOLDS:
+        if self.reynolds_max > WARNED:
             said.append(f"the Reynolds number is {self.reynolds_max:.3g} (mean {self.reynolds_mean:.3g}), above 1")
         if self.stokes_number < STOKES:
             said.append(f"the Stokes number is {self.stokes_number:.3g}, below 1")

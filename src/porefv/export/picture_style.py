@@ -260,9 +260,14 @@ class Colours(NamedTuple):
     @classmethod
     def of_speeds(cls, label: str, speeds: np.ndarray) -> Colours:
         """The scale of speeds from zero; it leaves out the highest hundredth if these are much higher than others."""
-        most, usual = float(speeds.max()), float(np.quantile(speeds, 0.99))
+        return cls.of_most(label, "m/s", speeds, 0.99, SPEEDS)
+
+    @classmethod
+    def of_most(cls, label: str, unit: str, values: np.ndarray, part: float, colour_map: str) -> Colours:
+        """The scale of positive values from zero to the largest, or to the quantile `part` if that is much less."""
+        most, usual = float(values.max()), float(np.quantile(values, part))
         far = most > 1.5 * usual > 0.0
-        return cls.over(label, "m/s", 0.0, usual if far else most, SPEEDS)._replace(beyond=far)
+        return cls.over(label, unit, 0.0, usual if far else most, colour_map)._replace(beyond=far)
 
     @classmethod
     def over(cls, label: str, unit: str, low: float, high: float, colour_map: str) -> Colours:

@@ -211,10 +211,8 @@ class Scene:
 
     def _add_paths(self, paths: Paths) -> None:
         """Paths as thin tubes, coloured by the time since the particle entered."""
-        most, usual = float(paths.times.max()), float(np.quantile(paths.residence_times, 0.9))
         # A particle that stays long in a corner would leave one colour to all others.
-        far = most > 1.5 * usual
-        scale = Colours.over("time since entry", "s", 0.0, usual if far else most, TIMES)._replace(beyond=far)
+        scale = Colours.of_most("time since entry", "s", paths.residence_times, 0.9, TIMES)
         self.colours.append(scale)
         self.notes.append(f"{counted(len(paths), 'path')} of particles, drawn by flux")
         radius = min(_PATH * float(self._radii.mean()), _PATH_OF_BOX)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from porefv.conductance.model import ConductanceModel
 from porefv.coupling.coupling_settings import SCHEMES
 from porefv.coupling.exchange import EXCHANGES
-from porefv.coupling.walls_in_time import WallHistory
+from porefv.coupling.walls_in_time import WallHistories, WallHistory
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.flow.fluid import Fluid
@@ -214,6 +214,14 @@ class SimulationScene(Scene):
     def saving(self) -> Saving:
         """Interval between checkpoints."""
         return self.checkpoint
+
+    def walls_in_time(self, begins: Iterable[float]) -> WallHistories:
+        """The walls since the start, of a run whose stages have begun at these times, the first ones first [s]."""
+        walls = WallHistories()
+        walls.set(self.walls, 0.0)
+        for stage, begin in zip(self.stages, begins, strict=False):
+            walls.set(stage.walls, begin)
+        return walls
 
     def read_packing(self) -> Packing:
         """The packing, in the scene's box or its own."""

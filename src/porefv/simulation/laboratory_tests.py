@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from porefv.coupling.consolidation import consolidation_coefficient, terzaghi_pressure, terzaghi_settlement
-from porefv.coupling.walls_in_time import ConstantPressure, WallHistories, WallHistory
+from porefv.coupling.walls_in_time import WallHistories
 from porefv.dem.plate import Plate
 from porefv.packing.box import WALL_AXES, WALLS
-from porefv.scenes.simulation_scene import SimulationScene
+from porefv.scenes.simulation_scene import AXES, SimulationScene
 from porefv.simulation.run_record import RunRecord
 
-AXES = ("x", "y", "z")
 # The largest part of the load that pores may still bear where a settlement counts as final.
 _CONSOLIDATED = 0.05
 
@@ -150,14 +149,12 @@ class LaboratoryTests:
 
     def wall_pressures(self, time: float) -> dict[str, float]:
         """Pressure [Pa] of each wall that holds one at a time [s]."""
-        histories = WallHistories()
-        histories.set(self._scene.walls, 0.0)
-        for stage, span in zip(self._scene.stages, self._record.spans, strict=False):
-            if span.begin <= time:
-                histories.set(stage.walls, span.begin)
-        walls = histories.at(time)
-        found = {wall: getattr(walls, wall).pressure for wall in WALLS}
-        return {wall: pressure for wall, pressure in found.items() if pressure is not None}
+        found = zip(WALLS, self._walls(time).at(time).pressures.tolist(), strict=True)
+        return {wall: pressure for wall, pressure in found if not np.isnan(pressure)}
+
+    def _walls(self, time: float) -> WallHistories:
+        """The walls as they are in the stage of a time [s]."""
+        return self._scene.walls_in_time(span.begin for span in self._record.spans if span.begin <= time)
 
     def oedometers(self, series: np.ndarray) -> list[Oedometer]:
         """The wet stages that consolidate along one axis, for which Terzaghi's solution is known.
@@ -183,7 +180,7 @@ class LaboratoryTests:
         known = [each for each in self._record.permeability if each.time <= span.begin and each.axis == AXES[axis]]
         pressures = self.wall_pressures(span.begin)
         before, rows = series[series["stage"] <= k], series[series["stage"] == k + 1]
-        one_base = len(set(pressures.values())) == 1 and set(pressures) <= set(ends) and self._steady(k)
+        one_base = len(set(pressures.values())) == 1 and set(pressures) <= set(ends) and self._walls(span.begin).steady
         if not known or not one_base or not len(before) or not len(rows):
             return None
         start, end, base = before[-1], rows[-1], next(iter(pressures.values()))
@@ -200,13 +197,6 @@ class LaboratoryTests:
         coefficient = consolidation_coefficient(known[-1].permeability, modulus, fluid.viscosity)
         drainage = 0.5 * height if lower and upper else height
         return Oedometer(k + 1, axis, span.begin, load, base, first, last, coefficient, (lower, upper), drainage)
-
-    def _steady(self, k: int) -> bool:
-        """Whether no wall has a pressure that changes within a stage."""
-        now: dict[str, WallHistory] = dict(self._scene.walls)
-        for stage in self._scene.stages[: k + 1]:
-            now |= dict(stage.walls)
-        return all(isinstance(history.pressure, ConstantPressure | None) for history in now.values())
 
     def triaxial(self) -> Triaxial | None:
         """The first triaxial test of the run; None if there is none."""

@@ -9,6 +9,7 @@ import numpy as np
 from porefv.conductance.model import ConductanceModel
 from porefv.coupling.coupling import Coupling
 from porefv.coupling.micromechanics import layer_means
+from porefv.coupling.validity import Validity
 from porefv.dem.dem import DEM
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
@@ -62,8 +63,8 @@ def grain_row(dem: DEM, coupling: Coupling | None, sizes: np.ndarray, residual: 
     return row | {"momentum_residual": residual}
 
 
-def fluid_row(coupling: Coupling, dem: DEM) -> dict[str, float]:
-    """`FLUID_COLUMNS`."""
+def fluid_row(coupling: Coupling, dem: DEM, validity: Validity) -> dict[str, float]:
+    """`FLUID_COLUMNS`; `validity` is the coupling's."""
     fluxes, power, total = coupling.wall_flux, coupling.power, total_stresses(dem, coupling)
     pressure, volumes = coupling.pressure, coupling.mesh.pore_volumes
     thrusts = _thrusts(coupling).tolist()
@@ -75,7 +76,7 @@ def fluid_row(coupling: Coupling, dem: DEM) -> dict[str, float]:
     weight = float(((dem.masses[:, None] * dem.gravity + dem.applied) * dem.velocities).sum())
     error = power.lost / abs(weight) if weight != 0.0 else np.nan
     row |= {"power_imbalance": power.imbalance, "power_weight": weight, "power_error": error}
-    row |= {"mass_imbalance": coupling.mass_imbalance} | asdict(coupling.validity)
+    row |= {"mass_imbalance": coupling.mass_imbalance} | asdict(validity)
     return row | {"iterations": coupling.effort.iterations, "meshes": coupling.effort.meshes}
 
 

@@ -23,8 +23,8 @@ from porefv.export.picture_style import (
     style,
 )
 from porefv.packing.box import WALLS
-from porefv.scenes.simulation_scene import SimulationScene
-from porefv.simulation.laboratory_tests import AXES, LaboratoryTests, Oedometer, Triaxial
+from porefv.scenes.simulation_scene import AXES, SimulationScene
+from porefv.simulation.laboratory_tests import LaboratoryTests, Oedometer, Triaxial
 from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
 from porefv.simulation.series import PROFILES

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from porefv.coupling.coupling import Coupling
-from porefv.coupling.walls_in_time import WallHistories
+from porefv.coupling.validity import Validity
 from porefv.dem.dem import DEM
 from porefv.errors import FORCE_OPTION, ComputationError, InertiaWarning, InputError, LooseStateWarning, printable
 from porefv.export.vtk_files import vtk_data_model
@@ -233,10 +233,7 @@ class _Run:
         self._warned: set[int] = set()  # stages of which a warning has been given
         self._saved = dem.steps, time.perf_counter()
         self._axis = AXES.index(scene.output.axis)
-        self._walls = WallHistories()
-        self._walls.set(scene.walls, 0.0)
-        for stage, span in zip(scene.stages, record.spans, strict=False):
-            self._walls.set(stage.walls, span.begin)
+        self._walls = scene.walls_in_time(span.begin for span in record.spans)
         point, output = record.checkpoint, scene.output
         if point is None:
             begin(self.directory, record)
@@ -400,8 +397,9 @@ class _Run:
         if row:
             numbers = measurements.grain_row(dem, coupling, np.array(self.record.box), residual)
             if coupling is not None:
-                numbers |= measurements.fluid_row(coupling, dem)
-                self._note_validity(k, coupling)
+                validity = coupling.validity
+                numbers |= measurements.fluid_row(coupling, dem, validity)
+                self._note_validity(k, coupling, validity)
             self._series.add(numbers | {"stage": k + 1})
         if self._profiles is not None and self._profile_times.due(dem.steps, ended):
             for layer in measurements.profile_rows(dem, coupling, self._axis, self.scene.output.layers):
@@ -409,9 +407,9 @@ class _Run:
         if self._frames is not None and self._frame_times.due(dem.steps, ended):
             self._frames.write(dem, coupling, self._walls.at(dem.time).slip)
 
-    def _note_validity(self, k: int, coupling: Coupling) -> None:
+    def _note_validity(self, k: int, coupling: Coupling, found: Validity) -> None:
         """Note where the end correction acts and the extremes of the numbers of validity; warn once a stage."""
-        found, record = coupling.validity, self.record
+        record = self.record
         record.end_correction = {
             wall: float(depth) for wall, depth in zip(WALLS, coupling.end_depths, strict=True) if depth > 0.0
         }

@@ -4,18 +4,6 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError
-from porefv.packing.packing import Packing
-
-
-@pytest.fixture
-def read(tmp_path):
-    """Read a table with this content."""
-
-    def reader(content, **options):
-        (tmp_path / "grains.csv").write_text(content)
-        return Packing.read(tmp_path / "grains.csv", **options)
-
-    return reader
 
 
 @pytest.mark.parametrize(

@@ -8,18 +8,6 @@ from porefv.packing.box import Box
 from porefv.packing.packing import Packing
 
 
-@pytest.fixture
-def read(tmp_path):
-    """Read a CSV file with this content."""
-
-    def reader(content):
-        path = tmp_path / "grains.csv"
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return Packing.read(path)
-
-    return reader
-
-
 @given(
     rows=arrays(np.float64, (3, 3), elements=st.floats(allow_nan=False, allow_infinity=False)),
     radii=arrays(np.float64, 3, elements=st.floats(1e-300, 1e300)),

@@ -1,11 +1,11 @@
 import re
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
 
 from porefv.errors import InputError, PackingFileWarning
-from porefv.packing.packing import Packing
 
 DATA = """LAMMPS data file, any title: Atoms
 
@@ -51,14 +51,9 @@ ITEM: ATOMS {columns}
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(read):
     """Read a LAMMPS file with this content."""
-
-    def reader(content, **options):
-        (tmp_path / "grains.lammps").write_text(content)
-        return Packing.read(tmp_path / "grains.lammps", **options)
-
-    return reader
+    return partial(read, name="grains.lammps")
 
 
 def test_a_data_file_gives_spheres_by_atom_id_and_the_box(read):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError, PackingFileWarning
-from porefv.packing.packing import Packing
 
 MERCURY = "2 0.5 0 0 -1 1 2 3\n0.1 0.2 0.3 0 0 0 {0} 0 0 0 0 0 0 0\n0.4 0.5 0.6 0 0 0 {0} 0 0 0 0 0 0 0\n"
 ESYS = """LSMGeometry 1.2
@@ -32,12 +31,11 @@ XYZ = (
 
 
 @pytest.fixture
-def read(tmp_path):
-    """Read a file with this content."""
+def read(read):
+    """Read a file with this content, of this name if not of another."""
 
     def reader(content, name="grains.data", **options):
-        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-        return Packing.read(tmp_path / name, **options)
+        return read(content, name, **options)
 
     return reader
 

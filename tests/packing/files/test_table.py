@@ -4,18 +4,6 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError, PackingFileWarning
-from porefv.packing.packing import Packing
-
-
-@pytest.fixture
-def read(tmp_path):
-    """Read a table with this content."""
-
-    def reader(content, name="grains.csv", **options):
-        (tmp_path / name).write_text(content)
-        return Packing.read(tmp_path / name, **options)
-
-    return reader
 
 
 @pytest.mark.parametrize(

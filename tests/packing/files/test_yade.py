@@ -1,4 +1,5 @@
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,14 +10,9 @@ from porefv.packing.packing import Packing
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(read):
     """Read a Yade text file with this content."""
-
-    def reader(content):
-        (tmp_path / "grains.txt").write_text(content)
-        return Packing.read(tmp_path / "grains.txt")
-
-    return reader
+    return partial(read, name="grains.txt")
 
 
 @pytest.mark.parametrize(
