@@ -86,6 +86,7 @@ def test_the_picture_shows_the_reference_and_warns_of_nothing(tmp_path):
     loose = MethodResult(Method("a, cg to 1e-02", "a", "cg", 1e-2), 1.0, 1.1 * exact, 1.0, 0.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", DeprecationWarning)  # between matplotlib and pyparsing; Python shows none
         draw(MethodComparison([same, loose, reference], reference), tmp_path / "trade.png")
     assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
 
