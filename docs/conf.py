@@ -1,6 +1,12 @@
 """The site: `sphinx-build -W -b html -c docs . build/site`, from the root of the repository, for links between folders."""
 
 import importlib.metadata
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import api_pages
 
 project = "porefv"
 author = "the authors of porefv"
@@ -8,13 +14,12 @@ copyright = "2026, the authors of porefv"
 release = importlib.metadata.version("porefv")
 
 root_doc = "docs/index"
-include_patterns = ["docs/**.md", "tutorials/**.md", "CHANGELOG.md", "CONTRIBUTING.md", "data/README.md"]
+include_patterns = ["docs/**.md", "docs/docstrings/*.rst", "tutorials/**.md", "CHANGELOG.md", "CONTRIBUTING.md", "data/README.md"]
 exclude_patterns = ["build", ".venv*", ".git", "src", "tests", "**/results", "**/.ipynb_checkpoints"]
 
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_copybutton",
@@ -34,7 +39,6 @@ nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
 
-autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 default_role = "py:obj"
@@ -48,3 +52,5 @@ html_extra_path = ["site"]
 html_theme_options = {"source_directory": ""}
 copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
+
+api_pages.write(Path(__file__).parent / "docstrings")

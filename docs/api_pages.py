@@ -1,0 +1,64 @@
+"""Pages of the site that are made from docstrings: one for each package that exports names, and one of errors."""
+
+import importlib
+import inspect
+from pathlib import Path
+
+# Packages, each with its public names: those of `__all__`, or of these modules.
+PACKAGES = {
+    "porefv.packing": (), "porefv.tessellation": (), "porefv.mesh": (), "porefv.conductance": (), "porefv.solvers": (),
+    "porefv.flow": (),
+    "porefv.transport": (
+        "diffusion.EffectiveDiffusion", "diffusion.effective_diffusion", "solute.Solute", "solute.Balance",
+        "residence.Residence", "residence.residence_time", "residence.breakthrough", "residence.vessel_peclet",
+    ),
+    "porefv.fipy": (
+        "fluid_mesh.FluidMesh", "flow_problem.FlowProblem", "pore_solver.PoreSolver", "pore_solver.use_pore_solver",
+    ),
+    "porefv.dem": (), "porefv.coupling": (), "porefv.export": (), "porefv.results": (), "porefv.scenes": (),
+    "porefv.simulation": (), "porefv.resolved": (), "porefv.comparison": (),
+}  # fmt: skip
+
+
+def write(folder: Path) -> None:
+    """Write the pages, and their index, into a folder; pages that would not change are left as they are."""
+    folder.mkdir(exist_ok=True)
+    listed = "\n   ".join([*PACKAGES, "porefv.errors"])
+    pages = {"index": _titled("Docstrings", _INTRODUCTION + f".. toctree::\n   :maxdepth: 1\n\n   {listed}\n")}
+    pages |= {package: _page(package, names) for package, names in PACKAGES.items()}
+    pages["porefv.errors"] = _titled(
+        "Errors and warnings: porefv.errors",
+        ".. automodule:: porefv.errors\n   :members:\n   :show-inheritance:\n",
+    )
+    for name, text in pages.items():
+        path = folder / f"{name}.rst"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+_INTRODUCTION = (
+    "For readers who write Python and know what they look for: every public name with shapes, units, errors and an "
+    "example, by package, in the order in which data flow. The `Python interface </docs/api>` shows how they work "
+    "together.\n\n"
+).replace("`Python interface </docs/api>`", ":doc:`Python interface </docs/api>`")
+
+
+def _page(package: str, names: tuple[str, ...]) -> str:
+    module = importlib.import_module(package)
+    parts = [f"{inspect.getdoc(module)}\n"]
+    for name in names or sorted(module.__all__, key=str.lower):
+        part, _, name = name.rpartition(".")
+        home = importlib.import_module(f"{package}.{part}") if part else module
+        found = getattr(home, name)
+        path = f"{getattr(found, '__module__', None)}.{name}"
+        if inspect.isclass(found):
+            parts.append(f".. autoclass:: {path}\n   :members:\n   :undoc-members:\n")
+        elif inspect.isfunction(found):
+            parts.append(f".. autofunction:: {path}\n")
+        else:
+            parts.append(f".. data:: {home.__name__}.{name}\n\n   ``{found!r}``\n")
+    return _titled(package, "\n".join(parts))
+
+
+def _titled(title: str, text: str) -> str:
+    return f"{title}\n{'=' * len(title)}\n\n{text}"
