@@ -1,8 +1,12 @@
-"""Pages of the site that are made from docstrings: one for each package that exports names, and one of errors."""
+"""Pages of the site that are made from the source: public names by package, errors, and the help of the commands."""
 
+import argparse
 import importlib
 import inspect
+import os
 from pathlib import Path
+
+from porefv.cli import program
 
 # Packages, each with its public names: those of `__all__`, or of these modules.
 PACKAGES = {
@@ -30,6 +34,7 @@ def write(folder: Path) -> None:
         "Errors and warnings: porefv.errors",
         ".. automodule:: porefv.errors\n   :members:\n   :show-inheritance:\n",
     )
+    pages["commands"] = _titled("Commands", _commands())
     for name, text in pages.items():
         path = folder / f"{name}.rst"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
@@ -51,13 +56,33 @@ def _page(package: str, names: tuple[str, ...]) -> str:
         home = importlib.import_module(f"{package}.{part}") if part else module
         found = getattr(home, name)
         path = f"{getattr(found, '__module__', None)}.{name}"
-        if inspect.isclass(found):
+        if inspect.isclass(found) and found.__name__ == name:
             parts.append(f".. autoclass:: {path}\n   :members:\n   :undoc-members:\n")
         elif inspect.isfunction(found):
             parts.append(f".. autofunction:: {path}\n")
         else:
-            parts.append(f".. data:: {home.__name__}.{name}\n\n   ``{found!r}``\n")
+            parts.append(f".. data:: {home.__name__}.{name}\n\n   {_alias(found)}\n")
     return _titled(package, "\n".join(parts))
+
+
+def _alias(found: object) -> str:
+    return f"Another name of `{found.__module__}.{found.__name__}`." if inspect.isclass(found) else f"``{found!r}``"
+
+
+def _commands() -> str:
+    """The help of each command, as a terminal of 80 columns shows it."""
+    os.environ["COLUMNS"] = "80"
+    parser = program._parser()
+    (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    parts = ["For users of the command line: what ``porefv COMMAND --help`` prints.\n", _literal(parser.format_help())]
+    for name, command in commands.choices.items():
+        title = f"porefv {name}"
+        parts += [f"{title}\n{'-' * len(title)}\n", _literal(command.format_help())]
+    return "\n".join(parts)
+
+
+def _literal(text: str) -> str:
+    return ".. code-block:: text\n\n" + "".join(f"   {line}\n" if line else "\n" for line in text.splitlines())
 
 
 def _titled(title: str, text: str) -> str:

@@ -17,6 +17,7 @@ from porefv.scenes.flow_scene import FlowScene
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "data/README.md")]
 PAGES += sorted((ROOT / "docs").glob("*.md"))
+WITH_LINKS = [*PAGES, *sorted((ROOT / "tutorials").glob("*.md"))]
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?: \d{3}\b)*(?:\.\d+)?(?:e[-+]?\d+)?")
 
 # What a scene needs at least; examples that show a table or two are laid over it.
@@ -101,7 +102,7 @@ def test_scenes_are_valid(page):
         FlowScene.from_mapping(LEAST | tomllib.loads(text), directory=ROOT / "data")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", WITH_LINKS, ids=lambda page: page.name)
 def test_relative_links_lead_somewhere(page):
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
@@ -125,3 +126,9 @@ def test_continuous_integration_runs_the_command_of_the_readme():
     commands = [text.strip() for _, text in blocks(ROOT / "README.md", "sh")]
     assert any("pytest" in command and command in script for command in commands)
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
+
+
+def test_the_gallery_has_every_picture_and_the_script_that_made_it():
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    made = re.findall(r"img/([\w.]+)\).*?\]\(\.\./[\w/]+\.py\)", text)
+    assert sorted(made) == sorted(path.name for path in (ROOT / "docs" / "img").iterdir())
