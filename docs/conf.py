@@ -38,6 +38,9 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
+# The only cells that are folded are solutions of exercises, and code of figures, which has its own label.
+nb_code_prompt_show = "Solution"
+nb_code_prompt_hide = "Solution"
 
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
