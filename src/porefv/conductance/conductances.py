@@ -38,7 +38,7 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
 
     Notes
     -----
-    Theory: :eq:`eq-conductance`.
+    Theory, method: :eq:`eq-conductance`.
     """
     ensure_pore_mesh(mesh)
     throats, slip = mesh.throats, one_value_each(slip, len(WALLS), "wall", "slip", bool)

@@ -18,7 +18,7 @@ class EffectiveRadius(ConductanceModel):
     spheres and walls. A wall of symmetry doubles the throat by its mirror image: the circle then stands on the wall,
     and the throat is half (a quarter, for two such walls) of the whole.
 
-    Theory: :eq:`eq-effective-radius`.
+    Theory, method: :eq:`eq-effective-radius`.
     """
 
     name = "effective-radius"

@@ -25,7 +25,7 @@ class HydraulicRadius(ConductanceModel):
 
     Notes
     -----
-    Theory: :eq:`eq-hydraulic-radius`.
+    Theory, method: :eq:`eq-hydraulic-radius`.
     """
 
     alpha: float = 0.5

@@ -57,7 +57,7 @@ class ConductanceModel(ABC):
 
     Notes
     -----
-    Theory: :eq:`eq-conductance`.
+    Theory, method: :eq:`eq-conductance`.
     """
 
     name: str

@@ -38,7 +38,7 @@ def diffusive_conductances(throats: Throats) -> np.ndarray:
 
     Notes
     -----
-    Theory: :eq:`eq-prism`.
+    Theory, diffusion: :eq:`eq-prism`.
 
     There is no parameter. A throat that is closed in its facet's plane passes nothing, even if both its vertices lie on
     the same side of the facet, where the section may be open. Where three spheres overlap in the facet, A^f counts

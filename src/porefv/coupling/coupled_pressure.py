@@ -99,7 +99,7 @@ class CoupledPressure:
 
     Notes
     -----
-    Theory: :eq:`eq-coupled-pressure` and :eq:`eq-implicit-drag`.
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-implicit-drag`.
     """
 
     def __init__(
@@ -187,7 +187,7 @@ class CoupledPressure:
 
         Notes
         -----
-        Theory: :eq:`eq-implicit-drag`.
+        Theory, grains and fluid: :eq:`eq-implicit-drag`.
         """
         if self._factor is None:
             self.prepare(wall_mobilities)
@@ -308,7 +308,7 @@ class CoupledPressure:
     def power(self, pressure: np.ndarray, velocities: np.ndarray) -> Power:
         """Where the power goes, grains and walls moving with (n + 6, 3).
 
-        Theory: :eq:`eq-power-balance`.
+        Theory, grains and fluid: :eq:`eq-power-balance`.
         """
         forces = self.forces(pressure)
         work = (forces * velocities).sum(axis=1)
@@ -329,7 +329,7 @@ class CoupledPressure:
 
         A step that is explicit in the drag is stable up to 2.
 
-        Theory: :eq:`eq-drag-number`.
+        Theory, grains and fluid: :eq:`eq-drag-number`.
         """
         solver = Solver(self.network)
         moves = np.zeros((len(mobilities) + 6, 3))

@@ -106,7 +106,7 @@ class Coupling:
 
     Notes
     -----
-    Theory: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
 
     Time is that of the grains. Pressures and forces act over a step, from t - dt to t, and velocities live in its
     middle.

@@ -45,7 +45,7 @@ class Exchange(NamedTuple):
 
     Notes
     -----
-    Theory: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
     """
 
     rows: np.ndarray

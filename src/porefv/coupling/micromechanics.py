@@ -52,7 +52,7 @@ def grain_stresses(contacts: Contacts, centres: np.ndarray, volumes: np.ndarray)
 
     Notes
     -----
-    Theory: :eq:`eq-grain-stress`.
+    Theory, grains and fluid: :eq:`eq-grain-stress`.
     """
     n = len(volumes)
     i, j = contacts.grains.T
@@ -87,7 +87,7 @@ def grain_strains(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: 
 
     Notes
     -----
-    Theory: :eq:`eq-grain-strain`.
+    Theory, grains and fluid: :eq:`eq-grain-strain`.
 
     u is that of the centres at the vertices, and linear on triangles. A corner that a cell has on a wall is the
     projection of a centre, and stays that: it moves with the wall along the normal, with the centre along the wall.
@@ -108,7 +108,7 @@ def cell_strains(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: A
 
     Cells fill the box: their mean, weighted by `PoreMesh.cell_volumes`, is the strain of the sample.
 
-    Theory: :eq:`eq-grain-strain`.
+    Theory, grains and fluid: :eq:`eq-grain-strain`.
     """
     return _strains(_over(_integrals(mesh, displacements, wall_displacements), mesh.cell_volumes))
 

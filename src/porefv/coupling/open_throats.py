@@ -37,7 +37,7 @@ def room(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
 def growth_of_open_throats(mesh: PoreMesh) -> np.ndarray:
     """(t,): factor of the conductances, 1 up to a room of 4 radii, with which a grain alone has Stokes' drag.
 
-    Theory: :eq:`eq-open-throats`.
+    Theory, grains and fluid: :eq:`eq-open-throats`.
     """
     all_slip = room(mesh, np.ones(6, bool))
     beyond = np.minimum(1.0, _ROOMY / np.maximum(all_slip, _ROOMY))

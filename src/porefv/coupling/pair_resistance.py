@@ -56,7 +56,7 @@ class PairLaw(NamedTuple):
 
     Notes
     -----
-    Theory: :eq:`eq-lubrication-normal`, :eq:`eq-lubrication-shear` and :eq:`eq-pair-far`.
+    Theory, grains and fluid: :eq:`eq-lubrication-normal`, :eq:`eq-lubrication-shear` and :eq:`eq-pair-far`.
     """
 
     viscosity: float
@@ -113,7 +113,7 @@ class PairResistance:
 
     Notes
     -----
-    Theory: :eq:`eq-pair-motion` and :eq:`eq-pair-force`.
+    Theory, grains and fluid: :eq:`eq-pair-motion` and :eq:`eq-pair-force`.
     """
 
     def __init__(self, mesh: PoreMesh, dragging: np.ndarray, law: PairLaw, grain_rows: np.ndarray | None = None):

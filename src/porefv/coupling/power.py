@@ -22,7 +22,7 @@ class Power:
 
     Notes
     -----
-    Theory: :eq:`eq-power-balance`.
+    Theory, grains and fluid: :eq:`eq-power-balance`.
     """
 
     grains: float

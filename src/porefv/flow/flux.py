@@ -35,7 +35,7 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, pressure: PressureField | n
 
     Notes
     -----
-    Theory: :eq:`eq-conductance`.
+    Theory, method: :eq:`eq-conductance`.
     """
     conductances = check_conductances(mesh, conductances)
     field, pairs = as_field(mesh, pressure), mesh.throats.pores

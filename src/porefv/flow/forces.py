@@ -82,7 +82,7 @@ class Forces:
     def conservation_residual(self) -> float:
         """Distance of the sum of all pressure and viscous forces from the thrust, relative to ΔP S.
 
-        Theory: :eq:`eq-force-sum`.
+        Theory, forces: :eq:`eq-force-sum`.
         """
         parts = (self.pressure, self.viscous, self.wall_pressure, self.wall_viscous)
         residual = np.abs(sum(part.sum(axis=0) for part in parts) - self.thrust).max()
@@ -138,7 +138,7 @@ def grain_forces(
 
     Notes
     -----
-    Theory: :eq:`eq-surface-split`, :eq:`eq-pressure-along-throat`, :eq:`eq-drag-shares` and :eq:`eq-buoyancy`.
+    Theory, forces: :eq:`eq-surface-split`, :eq:`eq-pressure-along-throat`, :eq:`eq-drag-shares` and :eq:`eq-buoyancy`.
     """
     ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)

@@ -76,7 +76,7 @@ def solve_imposed_flow(
 
     Notes
     -----
-    Theory: :eq:`eq-imposed-flow`.
+    Theory, method: :eq:`eq-imposed-flow`.
 
     Examples
     --------

@@ -389,7 +389,7 @@ class PoreFlow(FixedInputs):
 
         Notes
         -----
-        Theory: :eq:`eq-permeability`.
+        Theory, method: :eq:`eq-permeability`.
         """
         if self.sources or self.fixed_pressures:
             raise InputError("permeability is that between two walls, without sources and fixed pressures")
@@ -434,7 +434,7 @@ class PoreFlow(FixedInputs):
         what power flows would take with them. Between two walls power is in proportion to permeability: with all
         of them open it is k / (1 - closing_error) at most.
 
-        Theory: :eq:`eq-closing-error`.
+        Theory, method: :eq:`eq-closing-error`.
         """
         throats = self.mesh.throats
         doubtful = np.flatnonzero((self.conductances == 0.0) & ~throats.covered)

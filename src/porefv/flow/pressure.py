@@ -158,7 +158,7 @@ def solve_pressure(
 
     Notes
     -----
-    Theory: :eq:`eq-pressure`.
+    Theory, method: :eq:`eq-pressure`.
 
     Examples
     --------

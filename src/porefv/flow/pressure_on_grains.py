@@ -61,7 +61,7 @@ def solid_pressure_weights(
 
     Notes
     -----
-    Theory: :eq:`eq-acting-pressure`.
+    Theory, forces: :eq:`eq-acting-pressure`.
     """
     beyond = model.drop_beyond_vertices(mesh.throats, slip)
     if beyond is None:
@@ -101,7 +101,7 @@ def acting_pressure(
 
     Notes
     -----
-    Theory: :eq:`eq-acting-pressure`.
+    Theory, forces: :eq:`eq-acting-pressure`.
     """
     ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)

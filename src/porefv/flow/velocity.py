@@ -31,7 +31,7 @@ def pore_velocities(
 
     Notes
     -----
-    Theory: :eq:`eq-pore-velocity`.
+    Theory, method: :eq:`eq-pore-velocity`.
     """
     throats = mesh.throats
     centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]

@@ -48,7 +48,7 @@ class Throats(FixedInputs):
 
     Notes
     -----
-    Theory: :eq:`eq-throat`.
+    Theory, method: :eq:`eq-throat`.
 
     Values of a throat are sums over its facets, and signed like theirs (`Facets`). Where spheres overlap, or a throat
     is nearly closed, φ, Σγ or A^f may be zero or negative: nothing flows through such throats, and they are counted.
@@ -202,7 +202,7 @@ class Throats(FixedInputs):
 
         The section at height s is A^f + Σ θ s² / 2, with θ the angles of the spheres. Zero where A^f is not positive.
 
-        Theory: :eq:`eq-pressure-along-throat`.
+        Theory, forces: :eq:`eq-pressure-along-throat`.
         """
         facets = self.mesh.facets
         angles = np.empty(len(facets))

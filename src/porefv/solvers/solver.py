@@ -50,7 +50,7 @@ class SolverReport:
 
     Notes
     -----
-    Theory: :eq:`eq-imbalance`.
+    Theory, method: :eq:`eq-imbalance`.
     """
 
     name: str

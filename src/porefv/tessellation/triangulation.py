@@ -46,7 +46,7 @@ class RegularTriangulation:
 
     Notes
     -----
-    Theory: :eq:`eq-power`, :eq:`eq-laguerre-vertex` and :eq:`eq-wall-vertex`.
+    Theory, method: :eq:`eq-power`, :eq:`eq-laguerre-vertex` and :eq:`eq-wall-vertex`.
     """
 
     def __init__(self, centres: np.ndarray, radii: np.ndarray, box: Box):

@@ -84,7 +84,7 @@ def effective_diffusion(
 
     Notes
     -----
-    Theory: :eq:`eq-diffusion`.
+    Theory, diffusion: :eq:`eq-diffusion`.
 
     Examples
     --------

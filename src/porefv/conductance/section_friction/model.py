@@ -44,7 +44,7 @@ class SectionFriction(ConductanceModel):
 
     Notes
     -----
-    Theory: :eq:`eq-section-friction` and :eq:`eq-sections`.
+    Theory, section friction: :eq:`eq-section-friction` and :eq:`eq-sections`.
     """
 
     friction: float = 1.35

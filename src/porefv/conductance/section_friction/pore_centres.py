@@ -47,7 +47,7 @@ class Pores(NamedTuple):
 def centres_of_pores(throats: Throats) -> np.ndarray:
     """(m, 3): centre of each cell's pore, its Laguerre vertex moved to small spheres, from the local origin [m].
 
-    Theory: :eq:`eq-pore-centre`.
+    Theory, section friction: :eq:`eq-pore-centre`.
     """
     mesh = throats.mesh
     pores = Pores(mesh.cells, mesh.cell_pore, *mesh.cells_of_pores)
