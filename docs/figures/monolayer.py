@@ -1,4 +1,4 @@
-"""The figure of docs/theory.md that shows the method in two dimensions: a monolayer between slip walls.
+"""The figure of docs/theory_method.md that shows the method in two dimensions: a monolayer between slip walls.
 
     python docs/figures/monolayer.py
 

@@ -1,4 +1,4 @@
-"""The figure of docs/theory.md that shows one throat: its facet, its length, its surfaces, its sections.
+"""The figure of docs/theory_section_friction.md: one throat with its facet, its length, its surfaces, its sections.
 
     python docs/figures/throat.py
 

@@ -1,4 +1,4 @@
-"""The figure of docs/theory.md that shows walls as vertices of the triangulation: the four shapes of a cell.
+"""The figure of docs/theory_method.md that shows walls as vertices of the triangulation: the four shapes of a cell.
 
     python docs/figures/wall_cells.py
 

@@ -1,12 +1,19 @@
-"""README and docs are true: their Python runs, commands say what is printed, scenes are valid, links lead somewhere."""
+"""README and docs are true: their Python runs, commands say what is printed, scenes are valid, links lead somewhere.
+
+Links lead to files, to headings (`page.md#heading`), to numbered equations (`#eq-name`), and to public names
+(`#porefv.flow.forces.grain_forces`), which the site finds on the pages made from docstrings.
+"""
 
 import contextlib
+import importlib
+import importlib.util
 import io
 import os
 import re
 import shlex
 import shutil
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,6 +26,11 @@ PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md"
 PAGES += sorted((ROOT / "docs").glob("*.md"))
 WITH_LINKS = [*PAGES, *sorted((ROOT / "tutorials").glob("*.md"))]
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?: \d{3}\b)*(?:\.\d+)?(?:e[-+]?\d+)?")
+# Names of the numbered equations of all pages.
+EQUATION_LABELS = [
+    name for page in PAGES for name in re.findall(r"^\$\$ \((.+)\)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+]
+EQUATIONS = set(EQUATION_LABELS)
 
 # What a scene needs at least; examples that show a table or two are laid over it.
 LEAST = {"packing": "packings/n25_s1.csv", "walls": {"y_min": {"pressure": 1.0}, "y_max": {"pressure": 0.0}}}
@@ -109,6 +121,12 @@ def test_relative_links_lead_somewhere(page):
         if re.match(r"[a-z]+:", target):
             continue
         path, _, anchor = target.partition("#")
+        if not path and anchor.startswith("eq-"):
+            assert anchor in EQUATIONS, f"{page.name} links to {target}, which no equation of a page is called"
+            continue
+        if not path and anchor.startswith("porefv."):
+            assert is_public(anchor), f"{page.name} links to {target}, which no page made from docstrings has"
+            continue
         goal = (page.parent / path).resolve() if path else page
         assert goal.exists(), f"{page.name} links to {target}"
         if anchor:
@@ -119,6 +137,42 @@ def anchors(page):
     """The ids of a page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def is_public(path):
+    """Whether the pages made from docstrings have a name, or a member of a class among them."""
+    home = next((name for name in public_names() if path == name or path.startswith(f"{name}.")), None)
+    if home is None:
+        return False
+    found = public_names()[home]
+    for member in path[len(home) + 1 :].split(".") if path != home else ():
+        found = None if member.startswith("_") else getattr(found, member, None)
+    return found is not None
+
+
+@cache
+def public_names():
+    """What each public name stands for, by the path that the site has it under."""
+    specification = importlib.util.spec_from_file_location("api_pages", ROOT / "docs" / "api_pages.py")
+    api_pages = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(api_pages)
+    named = {}
+    for package, names in api_pages.PACKAGES.items():
+        for name in names or importlib.import_module(package).__all__:
+            part, _, name = name.rpartition(".")
+            found = getattr(importlib.import_module(f"{package}.{part}" if part else package), name)
+            named[f"{getattr(found, '__module__', package)}.{name}"] = found
+    return named
+
+
+def test_each_equation_has_a_name_of_its_own():
+    assert len(EQUATION_LABELS) == len(EQUATIONS) > 0
+
+
+def test_docstrings_and_numbered_equations_name_each_other():
+    """A docstring names an equation as `:eq:`; each equation is named by that of the function which computes it."""
+    source = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    assert set(re.findall(r":eq:`([^`]+)`", source)) == EQUATIONS
 
 
 def test_continuous_integration_runs_the_command_of_the_readme():

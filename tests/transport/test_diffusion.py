@@ -53,7 +53,7 @@ def test_dilute_packings_diffuse_as_maxwell_has_it(random_packing, solid, seed):
 
 @pytest.mark.parametrize(("kind", "error"), [("sc", 0.10), ("bcc", 0.06), ("fcc", 0.06)])
 def test_touching_lattices_diffuse_as_resolved(values, kind, error):
-    """The error of the sections, as docs/theory.md states it: sc +9.7 %, bcc -5.2 %, fcc +5.9 %."""
+    """The error of the sections, as docs/theory_diffusion.md states it: sc +9.7 %, bcc -5.2 %, fcc +5.9 %."""
     found = effective_diffusion(octant(kind), "y").relative_diffusivity
     assert_allclose(found, values("diffusion")["lattices"][kind], rtol=error)
 

@@ -35,6 +35,10 @@ def throat_conductances(mesh: PoreMesh, model: ConductanceModel, slip: np.ndarra
         If the model is no `ConductanceModel`, or gives an array of another shape; if the viscosity is not positive.
     ComputationError
         If a conductance is not a finite number.
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-conductance`.
     """
     ensure_pore_mesh(mesh)
     throats, slip = mesh.throats, one_value_each(slip, len(WALLS), "wall", "slip", bool)

@@ -17,6 +17,8 @@ class EffectiveRadius(ConductanceModel):
     r_eq is the radius of the disc of area A^f, r_inscr that of the circle in the facet's plane tangent to its
     spheres and walls. A wall of symmetry doubles the throat by its mirror image: the circle then stands on the wall,
     and the throat is half (a quarter, for two such walls) of the whole.
+
+    Theory, method: :eq:`eq-effective-radius`.
     """
 
     name = "effective-radius"

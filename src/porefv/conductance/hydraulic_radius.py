@@ -22,6 +22,10 @@ class HydraulicRadius(ConductanceModel):
     ----------
     alpha : float
         Shape factor, 1/2 for a circular duct of radius 2 R_h (C12's choice).
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-hydraulic-radius`.
     """
 
     alpha: float = 0.5

@@ -54,6 +54,10 @@ class ConductanceModel(ABC):
         By which results and messages call the model.
     force_split : {'surface', 'drag'}
         How the pressure drop of a throat acts on the spheres and walls around it: see `porefv.flow.grain_forces`.
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-conductance`.
     """
 
     name: str

@@ -38,6 +38,8 @@ def diffusive_conductances(throats: Throats) -> np.ndarray:
 
     Notes
     -----
+    Theory, diffusion: :eq:`eq-prism`.
+
     There is no parameter. A throat that is closed in its facet's plane passes nothing, even if both its vertices lie on
     the same side of the facet, where the section may be open. Where three spheres overlap in the facet, A^f counts
     what they share more than once, and may be negative: such a throat is closed, as for the flow.

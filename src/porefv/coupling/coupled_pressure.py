@@ -96,6 +96,10 @@ class CoupledPressure:
     ------
     InputError
         If walls hold the pressure of every pore.
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-implicit-drag`.
     """
 
     def __init__(
@@ -180,6 +184,10 @@ class CoupledPressure:
         ------
         ComputationError
             If it is not reached.
+
+        Notes
+        -----
+        Theory, grains and fluid: :eq:`eq-implicit-drag`.
         """
         if self._factor is None:
             self.prepare(wall_mobilities)
@@ -298,7 +306,10 @@ class CoupledPressure:
         return float(np.abs(outflows[self.free]).sum() / flow) if flow > 0.0 else 0.0
 
     def power(self, pressure: np.ndarray, velocities: np.ndarray) -> Power:
-        """Where the power goes, grains and walls moving with (n + 6, 3)."""
+        """Where the power goes, grains and walls moving with (n + 6, 3).
+
+        Theory, grains and fluid: :eq:`eq-power-balance`.
+        """
         forces = self.forces(pressure)
         work = (forces * velocities).sum(axis=1)
         full = self.full(pressure)
@@ -317,6 +328,8 @@ class CoupledPressure:
         """Largest eigenvalue of D Eᵀ G⁻¹ E, to 1 %, for these mobilities (n,); a lower bound where that is `enough`.
 
         A step that is explicit in the drag is stable up to 2.
+
+        Theory, grains and fluid: :eq:`eq-drag-number`.
         """
         solver = Solver(self.network)
         moves = np.zeros((len(mobilities) + 6, 3))

@@ -106,6 +106,8 @@ class Coupling:
 
     Notes
     -----
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
+
     Time is that of the grains. Pressures and forces act over a step, from t - dt to t, and velocities live in its
     middle.
     """

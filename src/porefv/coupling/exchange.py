@@ -42,6 +42,10 @@ class Exchange(NamedTuple):
     nodes : (e,) uint32 array
         Entry in arrays of pressures or volume rates: the cell itself, or one of the neighbour's. (Indices without sign
         need no look at whether they count from the end.)
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-coupled-pressure` and :eq:`eq-coupled-motion`.
     """
 
     rows: np.ndarray

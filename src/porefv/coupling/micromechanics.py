@@ -49,6 +49,10 @@ def grain_stresses(contacts: Contacts, centres: np.ndarray, volumes: np.ndarray)
     (n, 3, 3) array
         Positive in compression [Pa]. Their mean, weighted by volume, is the stress of the sample that contacts bear,
         the effective one. NaN for a grain without a Laguerre cell (V = 0).
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-grain-stress`.
     """
     n = len(volumes)
     i, j = contacts.grains.T
@@ -83,6 +87,8 @@ def grain_strains(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: 
 
     Notes
     -----
+    Theory, grains and fluid: :eq:`eq-grain-strain`.
+
     u is that of the centres at the vertices, and linear on triangles. A corner that a cell has on a wall is the
     projection of a centre, and stays that: it moves with the wall along the normal, with the centre along the wall.
     Between the corners of trapezoids and rectangles u is bilinear. The trace is therefore the part of its volume
@@ -101,6 +107,8 @@ def cell_strains(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: A
     """Mean strain of each cell, (m, 3, 3), positive in compression; parameters, errors and u as of `grain_strains`.
 
     Cells fill the box: their mean, weighted by `PoreMesh.cell_volumes`, is the strain of the sample.
+
+    Theory, grains and fluid: :eq:`eq-grain-strain`.
     """
     return _strains(_over(_integrals(mesh, displacements, wall_displacements), mesh.cell_volumes))
 

@@ -1,6 +1,6 @@
 """Throats with much more room than grains, as pores of loose states have them.
 
-Two things that are true of narrow throats are wrong there (docs/theory.md, Pair resistance):
+Two things that are true of narrow throats are wrong there (docs/theory_coupling.md, Pair resistance):
 
 - the drag of section friction on a grain alone in a box of slip walls is 1.77 times Stokes' however large the box; the
   exact one falls from 1.75 at a side of 7 radii to Stokes';
@@ -35,7 +35,10 @@ def room(mesh: PoreMesh, slip: np.ndarray) -> np.ndarray:
 
 
 def growth_of_open_throats(mesh: PoreMesh) -> np.ndarray:
-    """(t,): factor of the conductances, 1 up to a room of 4 radii, with which a grain alone has Stokes' drag."""
+    """(t,): factor of the conductances, 1 up to a room of 4 radii, with which a grain alone has Stokes' drag.
+
+    Theory, grains and fluid: :eq:`eq-open-throats`.
+    """
     all_slip = room(mesh, np.ones(6, bool))
     beyond = np.minimum(1.0, _ROOMY / np.maximum(all_slip, _ROOMY))
     return _ALONE / (1.0 + (_ALONE - 1.0) * beyond)

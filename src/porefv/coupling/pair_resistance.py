@@ -3,7 +3,7 @@
 The pores resist flow through grains that move together, and next to nothing else: grains that move without a change of
 pore volumes meet no drag. In loose states that is most of the motion. This module adds, for every edge of the
 triangulation between two grains, or a grain and a wall that drags the fluid, forces and torques against the relative
-velocity at the middle of the gap (docs/theory.md, Pair resistance):
+velocity at the middle of the gap (docs/theory_coupling.md, Pair resistance):
 
 - lubrication, normal, tangential and rolling, with the leading terms of Jeffrey and Onishi (1984), cut off at a gap of
   the roughness;
@@ -53,6 +53,10 @@ class PairLaw(NamedTuple):
     contact : float
         What stands for the terms of lubrication that do not grow as the gap closes: its coefficient over π μ a at
         contact, from where it falls to nothing at `lubricated` [-].
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-lubrication-normal`, :eq:`eq-lubrication-shear` and :eq:`eq-pair-far`.
     """
 
     viscosity: float
@@ -106,6 +110,10 @@ class PairResistance:
     ----------
     pairs : Pairs
         Coefficients are those of the last `set_positions`; at first of the mesh.
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-pair-motion` and :eq:`eq-pair-force`.
     """
 
     def __init__(self, mesh: PoreMesh, dragging: np.ndarray, law: PairLaw, grain_rows: np.ndarray | None = None):

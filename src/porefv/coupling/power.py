@@ -19,6 +19,10 @@ class Power:
         Work of the imposed pressures on what flows in.
     pairs : float
         Dissipated between grains that move past each other, and between grains and walls.
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-power-balance`.
     """
 
     grains: float

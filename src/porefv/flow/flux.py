@@ -32,6 +32,10 @@ def fluxes(mesh: PoreMesh, conductances: np.ndarray, pressure: PressureField | n
         For arrays of the wrong shape, or with values that are not allowed.
     ComputationError
         If a flux is not a finite number.
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-conductance`.
     """
     conductances = check_conductances(mesh, conductances)
     field, pairs = as_field(mesh, pressure), mesh.throats.pores

@@ -80,7 +80,10 @@ class Forces:
 
     @property
     def conservation_residual(self) -> float:
-        """Distance of the sum of all pressure and viscous forces from the thrust, relative to ΔP S."""
+        """Distance of the sum of all pressure and viscous forces from the thrust, relative to ΔP S.
+
+        Theory, forces: :eq:`eq-force-sum`.
+        """
         parts = (self.pressure, self.viscous, self.wall_pressure, self.wall_viscous)
         residual = np.abs(sum(part.sum(axis=0) for part in parts) - self.thrust).max()
         return float(residual / self.scale) if residual != 0.0 else 0.0
@@ -132,6 +135,10 @@ def grain_forces(
     ------
     InputError
         For an unknown split, or pressures of the wrong shape or not finite.
+
+    Notes
+    -----
+    Theory, forces: :eq:`eq-surface-split`, :eq:`eq-pressure-along-throat`, :eq:`eq-drag-shares` and :eq:`eq-buoyancy`.
     """
     ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)

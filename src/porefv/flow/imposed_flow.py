@@ -74,6 +74,10 @@ def solve_imposed_flow(
     ComputationError
         If the solver fails, or no open path leads from a wall of imposed flow to an imposed pressure.
 
+    Notes
+    -----
+    Theory, method: :eq:`eq-imposed-flow`.
+
     Examples
     --------
     >>> mesh = PoreMesh(Packing.read("data/packings/n25_s1.csv"))

@@ -386,6 +386,10 @@ class PoreFlow(FixedInputs):
         InputError
             If the walls that fluid passes are not one pair of opposite walls at different pressures, or there are
             sources or fixed pressures.
+
+        Notes
+        -----
+        Theory, method: :eq:`eq-permeability`.
         """
         if self.sources or self.fixed_pressures:
             raise InputError("permeability is that between two walls, without sources and fixed pressures")
@@ -429,6 +433,8 @@ class PoreFlow(FixedInputs):
         with π a² = A (Sampson 1891), and by Dirichlet's principle the pressures found without them bound from above
         what power flows would take with them. Between two walls power is in proportion to permeability: with all
         of them open it is k / (1 - closing_error) at most.
+
+        Theory, method: :eq:`eq-closing-error`.
         """
         throats = self.mesh.throats
         doubtful = np.flatnonzero((self.conductances == 0.0) & ~throats.covered)

@@ -156,6 +156,10 @@ def solve_pressure(
     ComputationError
         If the solver fails, or an isolated pore has a source.
 
+    Notes
+    -----
+    Theory, method: :eq:`eq-pressure`.
+
     Examples
     --------
     >>> mesh, walls = PoreMesh(Packing.read("data/packings/n25_s1.csv")), Walls.along("y")

@@ -58,6 +58,10 @@ def solid_pressure_weights(
         Walls of symmetry.
     held : (n_pores,) bool array
         Pores of imposed pressure, which is that on their grains.
+
+    Notes
+    -----
+    Theory, forces: :eq:`eq-acting-pressure`.
     """
     beyond = model.drop_beyond_vertices(mesh.throats, slip)
     if beyond is None:
@@ -94,6 +98,10 @@ def acting_pressure(
         Piezometric pressure of each pore [Pa].
     inside : (n_pores,) array, optional
         Pressure imposed on pores, NaN where there is none [Pa].
+
+    Notes
+    -----
+    Theory, forces: :eq:`eq-acting-pressure`.
     """
     ensure_no_imposed_flow(walls)
     field = as_field(mesh, pressure)

@@ -28,6 +28,10 @@ def pore_velocities(
     Returns
     -------
     (n_pores, 3) array [m/s]; zero for pores without volume.
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-pore-velocity`.
     """
     throats = mesh.throats
     centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]

@@ -29,6 +29,8 @@ class Facets(FixedInputs):
 
     Notes
     -----
+    Theory, method: :eq:`eq-throat` and :eq:`eq-exact-sums`.
+
     Values are signed, which makes sums over all facets exact: Σφ is the void volume, Σγ^k the free surface of sphere k.
     Where spheres overlap, single values of A^f, φ or γ may be zero or negative.
     """

@@ -119,7 +119,7 @@ class PoreMesh(CellMesh):
 
         They add up to the surface of the union of the spheres within the box. Without overlap none is negative. With
         overlap, caps that reach out of a cell count against it, as in `cell_void_volumes`: single flat cells may have
-        less than nothing, and a neighbour as much more (docs/theory.md, Surfaces of pores).
+        less than nothing, and a neighbour as much more (docs/theory_method.md, Surfaces of pores).
         """
         return np.bincount(self.cell_pore, self.cell_surfaces, self.n_pores)
 

@@ -48,6 +48,8 @@ class Throats(FixedInputs):
 
     Notes
     -----
+    Theory, method: :eq:`eq-throat`.
+
     Values of a throat are sums over its facets, and signed like theirs (`Facets`). Where spheres overlap, or a throat
     is nearly closed, φ, Σγ or A^f may be zero or negative: nothing flows through such throats, and they are counted.
     """
@@ -199,6 +201,8 @@ class Throats(FixedInputs):
         """(f,): height over the constriction at which the section of each facet's throat has twice its fluid area [m].
 
         The section at height s is A^f + Σ θ s² / 2, with θ the angles of the spheres. Zero where A^f is not positive.
+
+        Theory, forces: :eq:`eq-pressure-along-throat`.
         """
         facets = self.mesh.facets
         angles = np.empty(len(facets))

@@ -91,7 +91,7 @@ class MeshOptions(Table):
 
     unite_tolerance: PartOfRadius = key(
         "cells whose Laguerre vertices are closer than this fraction of the smallest radius around are "
-        "[one pore](theory.md#united-pores)",
+        "[one pore](theory_method.md#united-pores)",
         0.01,
     )
     wall_tolerance: Reach = key("the largest fraction of its radius by which a sphere may reach beyond a wall", 0.05)
@@ -115,7 +115,7 @@ class FlowTable(ConductanceTable):
     )
     tolerance: Annotated[
         float, Limits("must lie between 0 and 1 (a bound on the relative residual)", above=0.0, below=1.0)
-    ] = key("bound on the [imbalance](theory.md#solver) of the pressures, between 0 and 1", TOLERANCE)
+    ] = key("bound on the [imbalance](theory_method.md#solver) of the pressures, between 0 and 1", TOLERANCE)
     gravity: Vector = key("acceleration of gravity, for buoyancy", (0.0, 0.0, 0.0), unit="m/s²")
 
     def make(self) -> FlowOptions:

@@ -185,8 +185,8 @@ class ConductanceTable(Table):
     """A table with the keys of a conductance model."""
 
     conductance: Annotated[str, Choice(CONDUCTANCES)] = key(
-        '[model of the conductance](theory.md#conductance) of throats: `"section-friction"`, which `"auto"` stands '
-        'for, or the paper\'s `"hydraulic-radius"` and `"effective-radius"`. The errors of each are on the page '
+        '[model of the conductance](theory_method.md#conductance) of throats: `"section-friction"`, which `"auto"` '
+        'stands for, or the paper\'s `"hydraulic-radius"` and `"effective-radius"`. The errors of each are on the page '
         "[Accuracy](accuracy.md)",
         "auto",
     )

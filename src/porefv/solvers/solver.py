@@ -47,6 +47,10 @@ class SolverReport:
     seconds : float
     pressure_error : float
         Estimate of the largest error of a pressure, relative to the range of the held ones; NaN where not asked for.
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-imbalance`.
     """
 
     name: str

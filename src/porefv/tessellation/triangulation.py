@@ -43,6 +43,10 @@ class RegularTriangulation:
         Laguerre vertices (power centres) in the local frame [m].
     origin : (3,) array
         Origin of the local frame, x_local = x - origin, chosen such that the difference is exact [m].
+
+    Notes
+    -----
+    Theory, method: :eq:`eq-power`, :eq:`eq-laguerre-vertex` and :eq:`eq-wall-vertex`.
     """
 
     def __init__(self, centres: np.ndarray, radii: np.ndarray, box: Box):

@@ -82,6 +82,10 @@ def effective_diffusion(
     ComputationError
         If the solver fails.
 
+    Notes
+    -----
+    Theory, diffusion: :eq:`eq-diffusion`.
+
     Examples
     --------
     >>> from porefv import Box, Packing, PoreMesh

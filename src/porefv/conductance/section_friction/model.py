@@ -41,6 +41,10 @@ class SectionFriction(ConductanceModel):
     ----------
     friction, curvature : float
         c₁, c₂: fitted to permeabilities by resolved Stokes flow (docs/accuracy.md).
+
+    Notes
+    -----
+    Theory, section friction: :eq:`eq-section-friction` and :eq:`eq-sections`.
     """
 
     friction: float = 1.35

@@ -45,7 +45,10 @@ class Pores(NamedTuple):
 
 
 def centres_of_pores(throats: Throats) -> np.ndarray:
-    """(m, 3): centre of each cell's pore, its Laguerre vertex moved to small spheres, from the local origin [m]."""
+    """(m, 3): centre of each cell's pore, its Laguerre vertex moved to small spheres, from the local origin [m].
+
+    Theory, section friction: :eq:`eq-pore-centre`.
+    """
     mesh = throats.mesh
     pores = Pores(mesh.cells, mesh.cell_pore, *mesh.cells_of_pores)
     parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
