@@ -1,4 +1,4 @@
-"""The site: `sphinx-build -W -b html -c docs . build/site`, from the root of the repository, for links between folders."""
+"""The site: `sphinx-build -W -b html -c docs . build/site`, from the root: pages link to files of all folders."""
 
 import importlib.metadata
 import sys
@@ -14,7 +14,8 @@ copyright = "2026, the authors of porefv"
 release = importlib.metadata.version("porefv")
 
 root_doc = "docs/index"
-include_patterns = ["docs/**.md", "docs/docstrings/*.rst", "tutorials/**.md", "CHANGELOG.md", "CONTRIBUTING.md", "data/README.md"]
+include_patterns = ["docs/**.md", "docs/docstrings/*.rst", "tutorials/**.md"]
+include_patterns += ["CHANGELOG.md", "CONTRIBUTING.md", "data/README.md"]
 exclude_patterns = ["build", ".venv*", ".git", "src", "tests", "**/results", "**/.ipynb_checkpoints"]
 
 extensions = [

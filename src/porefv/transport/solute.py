@@ -43,7 +43,7 @@ class Balance:
     stored : float
         What the fluid in the pores has gained.
     largest_imbalance : float
-        Of any step: `|entered - left - reacted - stored|` over the larger of what entered in it and what the pores hold.
+        Of any step: `|entered - left - reacted - stored|` over the larger of what entered in it and what pores hold.
     """
 
     entered: float = 0.0
