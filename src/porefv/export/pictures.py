@@ -143,8 +143,8 @@ def _picture_3d(data: PictureData, what: str, title: str, size: PictureSize) -> 
         with style():
             legend = new_figure(size)
             legend.patch.set_alpha(0.0)
-            _explain(legend, size, title, scene.colours, (*scene.notes, f"the bar has {marks['bar'].text}"))
-        write_html(plotter, legend, path)
+            _explain(legend, size, title, scene.colours, (*scene.notes, f"the bar is {marks['bar'].text} long"))
+        write_html(plotter, legend, path, title)
 
     with style():
         figure = new_figure(size)
