@@ -119,7 +119,7 @@ def test_a_network_without_open_throats_says_why():
 
 
 def test_paths_are_those_of_a_flow(flow):
-    assert "200 paths of particles, drawn by flux" in picture(flow, "paths", **SMALL).notes
+    assert "200 paths of particles, sampled by flux" in picture(flow, "paths", **SMALL).notes
     with pytest.raises(InputError, match="needs the paths of a flow"):
         flow.mesh.plot("paths", **SMALL)
     walls = Walls(x_min=Wall(pressure=3.0), x_max=Wall(pressure=3.0))
