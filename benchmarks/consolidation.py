@@ -33,6 +33,7 @@ from porefv.dem.growth import grow
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 from porefv.dem.sizes import UniformSizes
+from porefv.export.picture_style import PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
@@ -200,14 +201,11 @@ def errors(run: dict, **kinds: str) -> tuple[float, float]:
     )
 
 
+@style()
 def draw(runs: dict[int, dict], path: Path) -> None:
     """Pressures over the height and settlement over time of the largest sample, and errors against grains across."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13.5, 4.4), layout="constrained")
+    figure = new_figure(PictureSize(2200, 800), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
     largest = runs[max(runs)]
     z = np.linspace(0.0, 2.0, 201)
     moments = course(largest)
@@ -216,20 +214,20 @@ def draw(runs: dict[int, dict], path: Path) -> None:
             (line,) = left.plot(terzaghi_pressure(z, t), 0.5 * z, lw=1.2)
             left.plot(pressure, (np.arange(LAYERS) + 0.5) / LAYERS, "o", ms=4, color=line.get_color(), label=f"{t:.2f}")
     left.set(xlabel="p / Δσ", ylabel="z / h", title=f"{largest['grains']} grains; lines: Terzaghi")
-    left.legend(title="T", fontsize=8)
+    left.legend(title="T")
     t = np.geomspace(1e-3, 2.0, 200)
     middle.semilogx(t, terzaghi_settlement(t), "k-", lw=1.2, label="Terzaghi")
     for grains, run in runs.items():
         moments = course(run)
         middle.semilogx([m[0] for m in moments], [m[2] for m in moments], "o", ms=3, label=f"{grains} grains")
     middle.set(xlabel="T", ylabel="U", ylim=(1.0, -0.05), title="settlement, less the bedding")
-    middle.legend(fontsize=8)
+    middle.legend()
     if len(runs) > 1:
         across = [run["dry"]["height"] / run["diameter"] for run in runs.values()]
         for part, name in enumerate(("pressure", "settlement")):
             right.loglog(across, [errors(run)[part] for run in runs.values()], "o-", ms=4, label=name)
         right.set(xlabel="grains across the sample", ylabel="largest error, T ≥ 0.05", title="convergence")
-        right.legend(fontsize=8)
+        right.legend()
     else:
         for modulus, k, label in (
             ("initial_modulus", "taps", "initial modulus, initial k"),
@@ -239,8 +237,8 @@ def draw(runs: dict[int, dict], path: Path) -> None:
             right.plot([m[0] for m in moments], [m[1][LAYERS // 2] for m in moments], "o", ms=4, label=label)
         right.plot(t, [exact_layers(x)[LAYERS // 2] for x in t], "k-", lw=1.2)
         right.set(xlabel="T", ylabel="p / Δσ in the middle", xlim=(0, 1.5), title="which constants")
-        right.legend(fontsize=8)
-    figure.savefig(path, dpi=110)
+        right.legend()
+    figure.savefig(path)
 
 
 def main() -> None:
