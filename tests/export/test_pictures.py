@@ -213,7 +213,12 @@ def test_a_notebook_shows_the_picture(flow):
     ({"what": "section", "at": 1.5}, "between 0 and 1 m, not at 1.5 m"),
     ({"what": "section", "axis": "w"}, "must be x, y or z"),
     ({"size": (10, 300)}, "100 to 10 000 pixels"),
+    ({"size": 800}, "a size is a width and a height"),
+    ({"size": "800x600"}, "a size is a width and a height"),
+    ({"size": (800.5, 600)}, "whole numbers of pixels"),
     ({"dpi": 0}, "30 to 1200 pixels per inch"),
+    ({"dpi": "high"}, "a number of pixels per inch"),
+    ({"what": "section", "at": "top"}, "a number of metres, not 'top'"),
     ({"size": (400, 300)}, r"2 x 1.5 inches; the letters need 3.5 x 2.5"),
 ])  # fmt: skip
 def test_what_cannot_be_drawn_is_refused(flow, options, said):

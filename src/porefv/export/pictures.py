@@ -121,7 +121,7 @@ def draw(
 ) -> Picture:
     """A picture of data; parameters and errors as of `picture`."""
     check_kind(what)
-    size = PictureSize(*size[:2], SIZE.dpi if dpi is None else dpi).check()
+    size = PictureSize.of(size, dpi)
     if what in SECTIONS:
         return section_picture(data, what, axis=axis, at=at, title=title, size=size)
     if axis is not None or at is not None:

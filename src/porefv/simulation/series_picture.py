@@ -16,7 +16,6 @@ from porefv.export.picture_style import (
     AXIS_COLOURS,
     FONTS,
     INK,
-    SIZE,
     PictureSize,
     label_in_unit,
     new_figure,
@@ -93,7 +92,7 @@ def series_picture(
     all_rows = rows + (triaxial is not None)
     size = size or (2000, 700 * all_rows)
     with style():
-        figure = new_figure(PictureSize(*size, SIZE.dpi if dpi is None else dpi).check(), layout="constrained")
+        figure = new_figure(PictureSize.of(size, dpi), layout="constrained")
         grid = figure.add_gridspec(all_rows, 6)
         panels = (3 if wet else 2) + (profiles is not None)
         places = [grid[row, left : left + 3] for row in range(rows) for left in (0, 3)]
