@@ -280,7 +280,7 @@ def draw_profiles(axes: Axes, run: dict) -> None:
             now, pressure, _ = course(run)[k]
             (line,) = axes.plot(terzaghi_pressure(z, now), 0.5 * z, lw=1.2)
             axes.plot(pressure, (np.arange(LAYERS) + 0.5) / LAYERS, "o", ms=4, color=line.get_color(), label=f"{t:g}")
-    axes.set(xlabel="p / Δσ", ylabel="z / h", title=f"{run['grains']} grains; lines: Terzaghi", xlim=(0.0, 1.3))
+    axes.set(xlabel="p / Δσ", ylabel="z / h", title=f"{run['grains']} grains; lines: Terzaghi", xlim=(0.0, 1.5))
     axes.legend(title="T")
 
 
@@ -292,10 +292,10 @@ def draw_errors(axes: Axes, samples: dict[int, list[dict]]) -> None:
         (line,) = axes.loglog(across, [np.mean(each) for each in found], "-", lw=1.2, label=f"{name}, mean")
         for x, each in zip(across, found, strict=True):
             axes.loglog([x] * len(each), each, "o", ms=3, color=line.get_color())
-    for axis in (axes.xaxis, axes.yaxis):
+    for axis, ticks in ((axes.xaxis, [8, 10, 12, 16, 20, 25]), (axes.yaxis, [0.005, 0.01, 0.02, 0.05, 0.1, 0.2])):
+        axis.set_major_locator(FixedLocator(ticks))
         axis.set_major_formatter("{x:g}")
-    axes.xaxis.set_major_locator(FixedLocator([8, 10, 12, 16, 20, 25]))
-    axes.xaxis.set_minor_locator(NullLocator())
+        axis.set_minor_locator(NullLocator())
     axes.set(xlabel="grains across the sample", ylabel="largest error, T ≥ 0.05", title="convergence; points: samples")
     axes.legend()
 
