@@ -3,24 +3,30 @@
 python benchmarks/settling.py                 the tables
 python benchmarks/settling.py --seeds 2       quicker
 python benchmarks/settling.py collapse        settlement in time at several viscosities
+python benchmarks/settling.py permeability    errors on grains that are held, with the conductances that go with pairs
 
 Up to a solid fraction of 0.25 grains are placed at random. Denser clouds are grown, and then mixed by Monte Carlo moves
 of hard spheres: growth leaves grains in contact.
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from porefv import Box, Fluid, Packing, Walls
+from porefv import Box, Fluid, Packing, PoreFlow, Walls
+from porefv.conductance.conductances import throat_conductances
 from porefv.coupling import Coupling
+from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
 from porefv.dem.dem import DEM
 from porefv.dem.growth import grow
 from porefv.dem.material import Material
 from porefv.dem.random_placement import cloud
 from porefv.dem.sizes import UniformSizes
+from porefv.resolved.reference import StokesReference
+from porefv.solvers.pressure_equation import solve_network
 
 SLIP = {"lateral": {"slip": True}}
 BOX = Box([0, 0, 0], [1, 1, 1])
@@ -173,13 +179,54 @@ def print_collapse():
         print(f"| {viscosity:.0f} | {numbers} | {100 * np.abs(found / basis - 1.0).max():.1f} % |", flush=True)
 
 
+def permeability_errors(reference):
+    """Relative errors of the permeability with section friction, and with the conductances that go with pairs."""
+    mesh, walls = reference.pore_mesh(), reference.walls
+    flow = PoreFlow(mesh, walls, Fluid(reference.viscosity))
+    narrow, alike = wall_reach(mesh, walls.slip), np.ones(6, bool)
+    without = throat_conductances(mesh, flow.conductance, alike, reference.viscosity)
+    conductances = (narrow * flow.conductances + (1.0 - narrow) * without) * growth_of_open_throats(mesh)
+    i, j = mesh.throats.pores.T
+    held = flow.imposed_pressures
+    most = np.nanmax(held)
+
+    def through(conductances):
+        pressure = solve_network(mesh.throats.pores, conductances, held, tolerance=1e-8).pressure
+        flux = conductances * (pressure[i] - pressure[j])
+        return flux[held[i] == most].sum() - flux[held[j] == most].sum()
+
+    plain = flow.permeability / reference.permeability
+    return plain - 1.0, plain * through(conductances) / through(flow.conductances) - 1.0
+
+
+def print_permeability():
+    """Errors over the cases of data/reference/stokes, by lateral walls."""
+    folder = Path(__file__).parent.parent / "data" / "reference" / "stokes"
+    columns = "lateral walls", "cases", "rms", "worst", "with pairs: rms", "worst", "changed by more than 0.3 points"
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
+    for kind, title in (("symmetry", "symmetry"), ("no_slip", "no-slip")):
+        paths = sorted(folder.glob(f"*_{kind}.json"))
+        found = {path.stem: permeability_errors(StokesReference.read(path)) for path in paths}
+        errors = 100.0 * np.array(list(found.values()))
+        rms, worst = np.sqrt((errors**2).mean(axis=0)), np.abs(errors).max(axis=0)
+        changed = np.abs(errors[:, 1] - errors[:, 0]) > 0.3
+        numbers = " | ".join(f"{rms[k]:.1f} % | {worst[k]:.1f} %" for k in range(2))
+        print(f"| {title} | {len(found)} | {numbers} | {changed.sum()} |")
+        for name, (before, after) in found.items():
+            if abs(after - before) > 0.003:
+                print(f"  {name} {100 * before:+.1f} % {100 * after:+.1f} %")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="?", choices=["tables", "collapse"], default="tables")
+    parser.add_argument("what", nargs="?", choices=["tables", "collapse", "permeability"], default="tables")
     parser.add_argument("--seeds", type=int, default=5)
     options = parser.parse_args()
     if options.what == "collapse":
         print_collapse()
+        return
+    if options.what == "permeability":
+        print_permeability()
         return
     seeds = options.seeds
     print("| c | common drag / law | mean speed / RZ | scatter / mean | fastest / mean | smallest eigenvalue |")
