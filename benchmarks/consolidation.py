@@ -4,8 +4,7 @@ The sample is brought to 5 kPa between smooth walls. Its modulus comes from a dr
 test, its permeability from a steady flow, both on the sample of the test; then the top plate presses with the test's
 stress at once, and the sample drains through both ends.
 
-    python benchmarks/consolidation.py --grains 500 1000 2000 5000 --seeds 5 5 5 3 --plain \\
-        --out docs/img/consolidation.png
+    python benchmarks/consolidation.py --grains 500 1000 2000 5000 --seeds 5 5 5 3 --out docs/img/consolidation.png
     python benchmarks/consolidation.py --grains 2000 --stress 50e3 --out docs/img/consolidation_large.png
 
 Samples differ by the seed of their growth. Each test is kept in --store (a file a test), and taken from there the next
