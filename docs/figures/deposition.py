@@ -103,7 +103,8 @@ class Course:
         centres = pv.PolyData(view.place(grains.points))
         centres["radius"] = grains["radius"] / view.scale
         centres["speed"] = np.linalg.norm(grains["velocity"], axis=1) / self._stokes
-        balls = centres.glyph(scale="radius", geom=pv.Sphere(radius=1.0), orient=False)
+        ball = pv.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20)
+        balls = centres.glyph(scale="radius", geom=ball, orient=False)
         look = {"scalars": "speed", "cmap": SPEEDS, "clim": [0.0, 0.6], "show_scalar_bar": False}
         plotter.add_mesh(balls, smooth_shading=True, ambient=0.3, **look)
         edges = pv.Box(np.stack([-view.half, view.half], axis=1).ravel()).extract_all_edges()

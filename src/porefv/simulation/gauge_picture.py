@@ -122,7 +122,7 @@ def draw_stress_profiles(axes: Sequence[Axes], profiles: np.ndarray, axis: str) 
         layers = found[found["time"] == time]
         middle = 0.5 * (layers["lower"] + layers["upper"])
         for ax, name in zip(axes, names, strict=True):
-            ax.plot(layers[name], middle, ".-", label=f"{time:.4g} s")
+            ax.plot(layers[name], middle, ".-", label=f"{time:.3g} s")
     most = max((_most(found[name]) for name in names), default=0.0)
     for ax, name in zip(axes, names, strict=True):
         label_in_unit(ax.xaxis, name.replace("_", " "), most, "Pa")

@@ -105,7 +105,7 @@ def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) 
         running = _Run(scene, record, dem, None, progress)
     else:
         dem, coupling = record.load(directory, scene.coupling.conductance)
-        record.scene, record.path = dict(scene.data), _path_of(scene)
+        record.scene, record.path, record.status = dict(scene.data), _path_of(scene), RUNNING
         running = _Run(scene, record, dem, coupling, progress)
     try:
         with _interruptions(running):
