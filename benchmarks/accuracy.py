@@ -28,6 +28,7 @@ from porefv.conductance.hydraulic_radius import HydraulicRadius
 from porefv.conductance.model import FORCE_SPLITS, ConductanceModel
 from porefv.conductance.section_friction.model import SectionFriction
 from porefv.conductance.section_friction.pore_centres import centres_of_pores
+from porefv.export.picture_style import PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.flow.forces import facet_forces
 from porefv.flow.interior import of_cells
@@ -190,11 +191,14 @@ def cases(out: Path | None) -> None:
         f"effective-radius times {factor:.2f}: rms {100 * rms(rest[fitted]):.1f} % fitted, "
         f"{100 * rms(rest[~fitted]):.1f} % not, worst {100 * np.abs(rest[~fitted]).max():.1f} %"
     )
-    if out is None:
-        return
-    import matplotlib.pyplot as plt
+    if out is not None:
+        draw_cases(out, found, errors)
 
-    figure, axes = plt.subplots(2, 1, figsize=(13, 8), sharex=True, layout="constrained")
+
+@style()
+def draw_cases(out: Path, found: list[Case], errors: dict[str, np.ndarray]) -> None:
+    figure = new_figure(PictureSize(2200, 1500), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True)
     places = np.arange(len(found))
     for model, shift in zip(MODELS, (-0.25, 0.0, 0.25), strict=True):
         for axis, column in zip(axes, (0, 1), strict=True):
@@ -211,7 +215,7 @@ def cases(out: Path | None) -> None:
     axes[1].set_xticks(places, [f"{case.name} {MARKS[group(case)]}".strip() for case in found], rotation=90, size=6)
     for axis in axes:
         axis.grid(axis="x", lw=0.3)
-    figure.savefig(out / "accuracy_cases.png", dpi=110)
+    figure.savefig(out / "accuracy_cases.png")
 
 
 # ---- throats ----------------------------------------------------------------------------------------------------
@@ -246,12 +250,15 @@ def throats(out: Path | None) -> None:
                         )
                 print(line)
     by_shape(found)
-    if out is None:
-        return
-    import matplotlib.pyplot as plt
+    if out is not None:
+        draw_throats(out, points)
 
+
+@style()
+def draw_throats(out: Path, points: dict[tuple[str, str], list[np.ndarray]]) -> None:
     shown = MODELS[1:]
-    figure, axes = plt.subplots(1, 2, figsize=(10, 5), sharex=True, sharey=True, layout="constrained")
+    figure = new_figure(PictureSize(1800, 900), layout="constrained")
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
     for axis, model in zip(axes, shown, strict=True):
         for (name, kind), tables in points.items():
             if name == model.name:
@@ -260,10 +267,10 @@ def throats(out: Path | None) -> None:
                 axis.scatter(table[:, 1], table[:, 2 + MODELS.index(model)], s=size, alpha=0.5, label=kind, lw=0)
         axis.plot([1e-6, 1e-1], [1e-6, 1e-1], "k", lw=0.8)
         axis.set(xscale="log", yscale="log", xlim=(3e-6, 3e-2), ylim=(3e-6, 3e-2), title=model.name,
-                 xlabel="K, resolved [m³/(Pa s)]")  # fmt: skip
-    axes[0].set_ylabel("K, model [m³/(Pa s)]")
+                 xlabel="K, resolved, m³/(Pa s)")  # fmt: skip
+    axes[0].set_ylabel("K, model, m³/(Pa s)")
     axes[0].legend(loc="upper left")
-    figure.savefig(out / "accuracy_throats.png", dpi=110)
+    figure.savefig(out / "accuracy_throats.png")
 
 
 def dissipation(case: Case, column: int) -> np.ndarray:
@@ -394,14 +401,14 @@ def walls_of(kind: str) -> Walls:
     return Walls.along("y", slip=kind == "symmetry")
 
 
+@style()
 def draw_paper(out: Path, nine: dict, ratios: list[str], flows: dict, sizes: dict, curves: dict) -> None:
-    import matplotlib.pyplot as plt
-
-    figure, ((nine_, ten), (eleven, twelve)) = plt.subplots(2, 2, figsize=(10, 8), layout="constrained")
+    figure = new_figure(PictureSize(1800, 1440), layout="constrained")
+    (nine_, ten), (eleven, twelve) = figure.subplots(2, 2)
     for (kind, name), curve in curves.items():
-        style = "k" if name == "resolved" else COLOURS[name]
+        colour = "k" if name == "resolved" else COLOURS[name]
         line, label = ("-", f"{name}") if kind == "no_slip" else ("--", None)
-        nine_.plot(list(sizes.values()), curve, line, marker="o", ms=4, color=style, label=label)
+        nine_.plot(list(sizes.values()), curve, line, marker="o", ms=4, color=colour, label=label)
     nine_.set(yscale="log", xlabel="spheres", ylabel="k / S", title="figure 9 (dashed: symmetry)")
     nine_.legend()
     places = [float(ratio) for ratio in ratios]
@@ -419,7 +426,7 @@ def draw_paper(out: Path, nine: dict, ratios: list[str], flows: dict, sizes: dic
     kept = (hydraulic > 0.0) & (effective > 0.0)
     eleven.plot(hydraulic[kept], effective[kept], ".", ms=3, color="black")
     eleven.axline((0, 0), slope=1, color="tab:red", lw=0.8)
-    eleven.set(xlabel="hydraulic radius [m]", ylabel="effective radius [m]", title="figure 11: 200 spheres",
+    eleven.set(xlabel="hydraulic radius, m", ylabel="effective radius, m", title="figure 11: 200 spheres",
                xlim=(0, 0.05), ylim=(0, 0.05))  # fmt: skip
     twelve.plot(places[1:], [nine["no_slip"][ratio]["centre_total"][0] for ratio in ratios[1:]], "k-o", ms=4)
     twelve.plot(places[1:], [nine["no_slip"][ratio]["centre_viscous"][0] for ratio in ratios[1:]], "k:o", ms=4)
@@ -431,7 +438,7 @@ def draw_paper(out: Path, nine: dict, ratios: list[str], flows: dict, sizes: dic
                title="figure 12: middle sphere (dotted: viscous part)")  # fmt: skip
     twelve.set_xticks([0.2, 0.3, 0.4, 0.5, 0.7], ["0.2", "0.3", "0.4", "0.5", "0.7"])
     twelve.xaxis.set_minor_formatter("")
-    figure.savefig(out / "accuracy_paper.png", dpi=110)
+    figure.savefig(out / "accuracy_paper.png")
 
 
 # ---- limits -----------------------------------------------------------------------------------------------------
@@ -461,11 +468,14 @@ def limits(out: Path | None) -> None:
                 more = with_grain(packing, place, size * room)
                 changes.append(PoreFlow(more, walls_of("no_slip"), conductance=model).permeability / before - 1.0)
             print(f"{name:10}{model.name:22}" + "".join(f"{100 * change:+8.2f}%" for change in changes))
-    if out is None:
-        return
-    import matplotlib.pyplot as plt
+    if out is not None:
+        draw_lattices(out, lattices)
 
-    figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
+
+@style()
+def draw_lattices(out: Path, lattices: dict[float, list[float]]) -> None:
+    figure = new_figure(PictureSize(1200, 800), layout="constrained")
+    axis = figure.subplots()
     for m, model in enumerate(MODELS):
         curve = [found[m] for found in lattices.values()]
         axis.plot(list(lattices), curve, "-o", ms=4, color=COLOURS[model.name], label=model.name)
@@ -475,7 +485,7 @@ def limits(out: Path | None) -> None:
     axis.set_yticks([0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axis.yaxis.set_minor_formatter("")
     axis.legend()
-    figure.savefig(out / "accuracy_lattices.png", dpi=110)
+    figure.savefig(out / "accuracy_lattices.png")
 
 
 # ---- large packings ---------------------------------------------------------------------------------------------

@@ -4,12 +4,13 @@ The sample is brought to 5 kPa between smooth walls. Its modulus comes from a dr
 test, its permeability from a steady flow, both on the sample of the test; then the top plate presses with the test's
 stress at once, and the sample drains through both ends.
 
-    python benchmarks/consolidation.py --grains 500 1000 2000 5000 --plain --out docs/img/consolidation.png
+    python benchmarks/consolidation.py --grains 500 1000 2000 5000 --seeds 5 5 5 3 --out docs/img/consolidation.png
     python benchmarks/consolidation.py --grains 2000 --stress 50e3 --out docs/img/consolidation_large.png
 
-Each run is kept in --store (a file a run), and taken from there the next time. The modulus is that between gauges
-within the sample, the permeability that between taps, as in a laboratory: the grains on the plates are softer bedded
-and drain freely. What the bedding settles, known from the dry test too, is taken off the settlement.
+Samples differ by the seed of their growth. Each test is kept in --store (a file a test), and taken from there the next
+time: a run that was stopped goes on with the tests that lack. The modulus is that between gauges within the sample, the
+permeability that between taps, as in a laboratory: the grains on the plates are softer bedded and drain freely. What
+the bedding settles, known from the dry test too, is taken off the settlement.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel
@@ -33,6 +36,7 @@ from porefv.dem.growth import grow
 from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 from porefv.dem.sizes import UniformSizes
+from porefv.export.picture_style import INK, PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
@@ -48,13 +52,18 @@ TIMES = np.array([0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.
 SHOWN = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 
 
-def sample(grains: int, store: Path) -> DEM:
-    """So many grains at rest under 5 kPa."""
-    path = store / f"sample_{grains}.npz"
+def named(grains: int, seed: int, ratio: float) -> str:
+    """Part of the names of a sample's files."""
+    return f"{grains}_{seed}" + ("" if ratio == 0.8 else f"_{ratio:g}")
+
+
+def sample(grains: int, store: Path, seed: int = 1, ratio: float = 0.8) -> DEM:
+    """So many grains at rest under 5 kPa, the smallest of `ratio` times the radius of the largest."""
+    path = store / f"sample_{named(grains, seed, ratio)}.npz"
     if not path.exists():
         box = Box([0, 0, 0], [SIDE] * 3)
         smooth = Material(15e6, 0.5, 0.0, 2600.0)
-        packing = grow(grains, UniformSizes(0.8), box, stress=CONFINEMENT, seed=1, material=smooth).packing
+        packing = grow(grains, UniformSizes(ratio), box, stress=CONFINEMENT, seed=seed, material=smooth).packing
         plates = {wall: Plate(stress=CONFINEMENT, top_speed=0.01) for wall in ("x_max", "y_max", "z_max")}
         dem = DEM(packing, MATERIAL, plates, damping=0.3)
         dem.run_to_rest(1e-5, 1e-4, 500_000)
@@ -62,11 +71,11 @@ def sample(grains: int, store: Path) -> DEM:
     return checkpoint.load(path)
 
 
-def dry(grains: int, stress: float, store: Path) -> dict:
+def dry(grains: int, stress: float, store: Path, seed: int, ratio: float) -> dict:
     """Compression of the dry sample from 5 kPa to a stress: settlement, and moduli by plates and by gauges within."""
-    path = store / f"dry_{grains}_{stress:g}.json"
+    path = store / f"dry_{named(grains, seed, ratio)}_{stress:g}.json"
     if not path.exists():
-        dem = sample(grains, store)
+        dem = sample(grains, store, seed, ratio)
         height, start = float(dem.box.size[2]), dem.positions
         places = (start[:, 2] - dem.box.lower[2]) / height
         dem.set_plates({"z_max": Plate(stress=stress, top_speed=0.01)})
@@ -117,14 +126,16 @@ def print_ends(grains: int, store: Path) -> None:
         )
 
 
-def consolidation(grains: int, stress: float, store: Path, conductance: str, **options) -> dict:
+def consolidation(
+    grains: int, seed: int, ratio: float, stress: float, store: Path, conductance: str, **options
+) -> dict:
     """The coupled test: profiles of pressure and settlement at given time factors."""
     name = "_".join([conductance, *(f"{key}-{value}" for key, value in sorted(options.items()))])
     model = MODELS[conductance]()
-    path = store / f"wet_{grains}_{stress:g}_{name}.json"
+    path = store / f"wet_{named(grains, seed, ratio)}_{stress:g}_{name}.json"
     if not path.exists():
-        measured = dry(grains, stress, store)
-        dem = sample(grains, store)
+        measured = dry(grains, stress, store, seed, ratio)
+        dem = sample(grains, store, seed, ratio)
         dem.damping = 0.0
         flow = permeability(dem.packing, model)
         height = float(dem.box.size[2])
@@ -159,7 +170,7 @@ def consolidation(grains: int, stress: float, store: Path, conductance: str, **o
         path.write_text(
             json.dumps(
                 {
-                    "grains": grains, "stress": stress, "options": options, "dry": measured, "flow": flow,
+                    "grains": grains, "seed": seed, "stress": stress, "options": options, "flow": flow,
                     "diameter": float(2 * dem.radii.mean()), "step": dem.step, "drag_number": coupling.drag_number,
                     "rows": rows, "steps": effort.steps, "iterations": effort.iterations, "meshes": effort.meshes,
                     "seconds": time.perf_counter() - begin, "cpu": time.process_time() - cpu,
@@ -167,7 +178,10 @@ def consolidation(grains: int, stress: float, store: Path, conductance: str, **o
                 }
             )
         )  # fmt: skip
-    return json.loads(path.read_text()) | {"dry": dry(grains, stress, store)}
+    run = json.loads(path.read_text()) | {"dry": dry(grains, stress, store, seed, ratio)}
+    run["dry"]["initial_modulus"] = dry(grains, 1.1 * CONFINEMENT, store, seed, ratio)["gauged_modulus"]
+    run["flow"]["after"] = run["dry"]["permeability_after"][conductance]
+    return run
 
 
 def exact_layers(t: float) -> np.ndarray:
@@ -200,98 +214,149 @@ def errors(run: dict, **kinds: str) -> tuple[float, float]:
     )
 
 
-def draw(runs: dict[int, dict], path: Path) -> None:
-    """Pressures over the height and settlement over time of the largest sample, and errors against grains across."""
-    import matplotlib
+def spread(values: list[float]) -> str:
+    """Mean and standard deviation of samples, or the value of one."""
+    mean = f"{np.mean(values):.3f}"
+    return mean if len(values) == 1 else f"{mean} ± {np.std(values, ddof=1):.3f}"
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
 
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13.5, 4.4), layout="constrained")
-    largest = runs[max(runs)]
+def print_table(corrected: dict[int, list[dict]], plain: dict[int, list[dict]]) -> None:
+    """A row for each number of grains: means over the samples, and the standard deviation of errors."""
+    print(
+        "\n| grains | samples | across | k, m² | E, MPa | error of p/Δσ, T ≥ 0.05 | of U | p/Δσ, ends not corrected |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
+    for grains, runs in corrected.items():
+        across, k, modulus = np.mean(
+            [(x["dry"]["height"] / x["diameter"], x["flow"]["taps"], x["dry"]["gauged_modulus"] / 1e6) for x in runs],
+            axis=0,
+        )
+        pressures, settlements = zip(*(errors(run) for run in runs), strict=True)
+        ends = spread([errors(run)[0] for run in plain[grains]]) if grains in plain else ""
+        print(
+            f"| {grains} | {len(runs)} | {across:.1f} | {k:.2e} | {modulus:.2f} | {spread(pressures)} | "
+            f"{spread(settlements)} | {ends} |"
+        )
+
+
+def draw(samples: dict[int, list[dict]], path: Path) -> None:
+    """Pressures over the height, settlement over time, and errors against grains across or which constants.
+
+    Pressures are those of the first sample of the most grains, settlements those of the first of each number.
+    """
+    with style():
+        figure = new_figure(PictureSize(1700, 620, 150), layout="constrained")
+        left, middle, right = figure.subplots(1, 3)
+        runs = {grains: found[0] for grains, found in samples.items()}
+        largest = runs[max(runs)]
+        draw_profiles(left, largest)
+        t = np.geomspace(1e-3, 2.0, 200)
+        middle.semilogx(t, terzaghi_settlement(t), "-", color=INK, lw=1.2, label="Terzaghi")
+        for grains, run in runs.items():
+            moments = course(run)
+            middle.semilogx([m[0] for m in moments], [m[2] for m in moments], "o", ms=3, label=f"{grains} grains")
+        middle.set(xlabel="T", ylabel="U", ylim=(1.0, -0.05), title="settlement, less the bedding")
+        middle.legend()
+        if len(runs) > 1:
+            draw_errors(right, samples)
+        else:
+            for modulus, k, label in (
+                ("initial_modulus", "taps", "initial modulus, initial k"),
+                ("gauged_modulus", "after", "secant modulus, final k"),
+            ):
+                moments = course(largest, modulus, k)
+                right.plot([m[0] for m in moments], [m[1][LAYERS // 2] for m in moments], "o", ms=4, label=label)
+            right.plot(t, [exact_layers(x)[LAYERS // 2] for x in t], "-", color=INK, lw=1.2, label="Terzaghi")
+            right.set(xlabel="T", ylabel="p / Δσ in the middle", xlim=(0, 1.5), title="which constants")
+            right.legend()
+        figure.savefig(path)
+
+
+def draw_profiles(axes: Axes, run: dict) -> None:
+    """Pressures of layers beside Terzaghi's, at some of the times."""
     z = np.linspace(0.0, 2.0, 201)
-    moments = course(largest)
-    for t, pressure, _ in moments:
-        if np.isclose(TIMES, t, rtol=0.1).any() and round(float(TIMES[np.argmin(abs(TIMES - t))]), 3) in SHOWN:
-            (line,) = left.plot(terzaghi_pressure(z, t), 0.5 * z, lw=1.2)
-            left.plot(pressure, (np.arange(LAYERS) + 0.5) / LAYERS, "o", ms=4, color=line.get_color(), label=f"{t:.2f}")
-    left.set(xlabel="p / Δσ", ylabel="z / h", title=f"{largest['grains']} grains; lines: Terzaghi")
-    left.legend(title="T", fontsize=8)
-    t = np.geomspace(1e-3, 2.0, 200)
-    middle.semilogx(t, terzaghi_settlement(t), "k-", lw=1.2, label="Terzaghi")
-    for grains, run in runs.items():
-        moments = course(run)
-        middle.semilogx([m[0] for m in moments], [m[2] for m in moments], "o", ms=3, label=f"{grains} grains")
-    middle.set(xlabel="T", ylabel="U", ylim=(1.0, -0.05), title="settlement, less the bedding")
-    middle.legend(fontsize=8)
-    if len(runs) > 1:
-        across = [run["dry"]["height"] / run["diameter"] for run in runs.values()]
-        for part, name in enumerate(("pressure", "settlement")):
-            right.loglog(across, [errors(run)[part] for run in runs.values()], "o-", ms=4, label=name)
-        right.set(xlabel="grains across the sample", ylabel="largest error, T ≥ 0.05", title="convergence")
-        right.legend(fontsize=8)
-    else:
-        for modulus, k, label in (
-            ("initial_modulus", "taps", "initial modulus, initial k"),
-            ("gauged_modulus", "after", "secant modulus, final k"),
-        ):
-            moments = course(largest, modulus, k)
-            right.plot([m[0] for m in moments], [m[1][LAYERS // 2] for m in moments], "o", ms=4, label=label)
-        right.plot(t, [exact_layers(x)[LAYERS // 2] for x in t], "k-", lw=1.2)
-        right.set(xlabel="T", ylabel="p / Δσ in the middle", xlim=(0, 1.5), title="which constants")
-        right.legend(fontsize=8)
-    figure.savefig(path, dpi=110)
+    for k, t in enumerate(TIMES):
+        if t in SHOWN:
+            now, pressure, _ = course(run)[k]
+            (line,) = axes.plot(terzaghi_pressure(z, now), 0.5 * z, lw=1.2)
+            axes.plot(pressure, (np.arange(LAYERS) + 0.5) / LAYERS, "o", ms=4, color=line.get_color(), label=f"{t:g}")
+    axes.set(xlabel="p / Δσ", ylabel="z / h", title=f"{run['grains']} grains; lines: Terzaghi", xlim=(0.0, 1.5))
+    axes.legend(title="T")
+
+
+def draw_errors(axes: Axes, samples: dict[int, list[dict]]) -> None:
+    """Errors of all samples against the grains across, and a line through the means."""
+    for part, name in enumerate(("pressure", "settlement")):
+        across = [np.mean([run["dry"]["height"] / run["diameter"] for run in runs]) for runs in samples.values()]
+        found = [[errors(run)[part] for run in runs] for runs in samples.values()]
+        (line,) = axes.loglog(across, [np.mean(each) for each in found], "-", lw=1.2, label=f"{name}, mean")
+        for x, each in zip(across, found, strict=True):
+            axes.loglog([x] * len(each), each, "o", ms=3, color=line.get_color())
+    for axis, ticks in ((axes.xaxis, [8, 10, 12, 16, 20, 25]), (axes.yaxis, [0.005, 0.01, 0.02, 0.05, 0.1, 0.2])):
+        axis.set_major_locator(FixedLocator(ticks))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
+    axes.set(xlabel="grains across the sample", ylabel="largest error, T ≥ 0.05", title="convergence; points: samples")
+    axes.legend()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--grains", type=int, nargs="+", default=[500, 1000, 2000, 5000])
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=[1], help="samples of each number of grains, or one number for all"
+    )
+    parser.add_argument("--ratio", type=float, default=0.8, help="smallest over largest radius")
     parser.add_argument("--stress", type=float, default=10e3, help="of the plate in the test [Pa]")
     parser.add_argument("--store", type=Path, default=Path("consolidation"), help="directory for runs")
     parser.add_argument("--exchange", default="facets", help="facets or volumes")
     parser.add_argument("--conductance", choices=MODELS, default=AUTO.name)
+    parser.add_argument("--pairs", action="store_true", help="with the resistance of pairs")
     parser.add_argument("--out", type=Path, help="picture to draw")
     parser.add_argument("--ends", action="store_true", help="only say how deep the ends are, by model of conductance")
     parser.add_argument("--plain", action="store_true", help="without the correction of the ends, too")
     options = parser.parse_args()
     options.store.mkdir(exist_ok=True)
-    corrected = {}
     if options.ends:
         for grains in options.grains:
             print_ends(grains, options.store)
         return
-    for grains in options.grains:
-        for ends in (True, False) if options.plain else (True,):
-            other = {} if options.exchange == "facets" else {"exchange": options.exchange}
-            run = consolidation(
-                grains, options.stress, options.store, options.conductance, end_correction=ends, **other
-            )
-            run["dry"]["initial_modulus"] = dry(grains, 1.1 * CONFINEMENT, options.store)["gauged_modulus"]
-            run["flow"]["after"] = run["dry"]["permeability_after"][options.conductance]
-            flow, moduli = run["flow"], run["dry"]
-            print(
-                f"{grains} grains, ends {'corrected' if ends else 'as they are'}: k {flow['taps']:.4g} between taps, "
-                f"{flow['whole']:.4g} in all, {flow['after']:.4g} m² in the end; "
-                f"E {moduli['gauged_modulus']:.4g} between gauges, "
-                f"{moduli['modulus']:.4g} between plates, {moduli['initial_modulus']:.4g} Pa at first"
-            )
-            print(
-                f"  {run['steps']} steps of {run['step']:.3g} s, {run['seconds']:.0f} s ({run['cpu']:.0f} s of CPU), "
-                f"{run['iterations'] / run['steps']:.2f} iterations a step, {run['meshes']} meshes; "
-                f"power balances to {run['imbalance']:.1e}"
-            )
-            for kinds in (
-                {},
-                {"modulus": "modulus", "taps": "whole"},
-                {"modulus": "initial_modulus"},
-                {"taps": "after"},
-            ):
-                pressure, settled = errors(run, **kinds)
-                print(f"  errors of pressure {pressure:.3f}, of settlement {settled:.3f} {kinds or ''}")
-            if ends:
-                corrected[grains] = run
+    seeds = options.seeds if len(options.seeds) > 1 else options.seeds * len(options.grains)
+    other: dict[str, object] = {} if options.exchange == "facets" else {"exchange": options.exchange}
+    if options.pairs:
+        other["pair_resistance"] = True
+    found: dict[bool, dict[int, list[dict]]] = {True: {}, False: {}}
+    for grains, samples in zip(options.grains, seeds, strict=True):
+        for seed in range(1, samples + 1):
+            for ends in (True, False) if options.plain else (True,):
+                run = consolidation(
+                    grains, seed, options.ratio, options.stress, options.store, options.conductance,
+                    end_correction=ends, **other,
+                )  # fmt: skip
+                print_run(run, ends)
+                found[ends].setdefault(grains, []).append(run)
+    print_table(found[True], found[False])
     if options.out:
-        draw(corrected, options.out)
+        draw(found[True], options.out)
+
+
+def print_run(run: dict, ends: bool) -> None:
+    """Constants, cost and errors of one sample."""
+    flow, moduli = run["flow"], run["dry"]
+    print(
+        f"{run['grains']} grains, seed {run['seed']}, ends {'corrected' if ends else 'as they are'}: "
+        f"k {flow['taps']:.4g} between taps, {flow['whole']:.4g} in all, {flow['after']:.4g} m² in the end; "
+        f"E {moduli['gauged_modulus']:.4g} between gauges, "
+        f"{moduli['modulus']:.4g} between plates, {moduli['initial_modulus']:.4g} Pa at first"
+    )
+    print(
+        f"  {run['steps']} steps of {run['step']:.3g} s, {run['seconds']:.0f} s ({run['cpu']:.0f} s of CPU), "
+        f"{run['iterations'] / run['steps']:.2f} iterations a step, {run['meshes']} meshes; "
+        f"power balances to {run['imbalance']:.1e}; highest pressure at first {run['rows'][0]['peak']:.2f} Δσ"
+    )
+    for kinds in ({}, {"modulus": "modulus", "taps": "whole"}, {"modulus": "initial_modulus"}, {"taps": "after"}):
+        pressure, settled = errors(run, **kinds)
+        print(f"  errors of pressure {pressure:.3f}, of settlement {settled:.3f} {kinds or ''}", flush=True)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from porefv.conductance.model import ConductanceModel
 from porefv.conductance.registry import AUTO, MODELS
 from porefv.conductance.section_friction.model import SectionFriction
 from porefv.errors import PorefvError
+from porefv.export.picture_style import PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
@@ -505,12 +506,11 @@ def grain_table(found: dict[str, dict[str, np.ndarray]], sizes: np.ndarray) -> s
     return "\n".join(parts)
 
 
-def draw_cases(rows: list[Row]) -> None:
-    """Two pictures: how exact each case is, lattices nudged."""
-    from matplotlib import pyplot
-
-    done = [row for row in rows if not row.refusal]
-    figure, axes = pyplot.subplots(figsize=(11, 5.5), layout="constrained")
+@style()
+def draw_cases(done: list[Row]) -> None:
+    """How exact each case is that was not refused."""
+    figure = new_figure(PictureSize(2000, 1000), layout="constrained")
+    axes = figure.subplots()
     for name, mark in (("imbalance", "o"), ("forces", "^"), ("copy", "x")):
         values = [max(getattr(row, name), 1e-17) for row in done]
         label = {"imbalance": "flux imbalance", "forces": "force sum", "copy": "shuffled and scaled copy"}[name]
@@ -521,14 +521,19 @@ def draw_cases(rows: list[Row]) -> None:
         starts.setdefault(row.case.axis, k)
     for axis, start in starts.items():
         axes.axvline(start - 0.5, color="0.8", linewidth=0.8, zorder=0)
-        axes.text(start, 3.0, axis, rotation=35, fontsize=8)
+        axes.text(start, 3.0, axis, rotation=35)
     axes.set(
         ylabel="relative error", xticks=[], xlabel="cases that finished, in the order of the tables", ylim=(5e-18, 1)
     )
-    axes.legend(loc="upper left", fontsize=8)
-    figure.savefig(DOCS / "img" / "extremes.png", dpi=120)
+    axes.legend(loc="upper left")
+    figure.savefig(DOCS / "img" / "extremes.png")
 
-    figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
+
+@style()
+def draw_lattices(done: list[Row]) -> None:
+    """Lattices nudged."""
+    figure = new_figure(PictureSize(1300, 850), layout="constrained")
+    axes = figure.subplots()
     for kind in LATTICES:
         ks = [row for row in done if row.case.axis == "Lattices" and row.case.name.startswith(f"{kind},")]
         nudges = [float(row.case.name.split()[-1]) for row in ks[1:]]
@@ -537,25 +542,25 @@ def draw_cases(rows: list[Row]) -> None:
     axes.set(xlabel="centres nudged by up to so much of the cell", ylabel="change of permeability")
     axes.grid(alpha=0.3)
     axes.legend()
-    figure.savefig(DOCS / "img" / "extremes_lattices.png", dpi=120)
+    figure.savefig(DOCS / "img" / "extremes_lattices.png")
 
 
+@style()
 def draw_grains(found: dict[str, dict[str, np.ndarray]], sizes: np.ndarray) -> None:
     """One more grain: in the widest pore, in the mean of several, and the highest of these."""
-    from matplotlib import pyplot
-
     titles = ("widest pore", "mean of several", "highest of these")
-    figure, axes = pyplot.subplots(1, 3, figsize=(12, 4.5), sharey=True, layout="constrained")
+    figure = new_figure(PictureSize(2000, 800), layout="constrained")
+    axes = figure.subplots(1, 3, sharey=True)
     for k, (name, models) in enumerate(found.items()):
-        for model, style in zip(models, ("o-", "x--", "s:"), strict=True):
+        for model, line in zip(models, ("o-", "x--", "s:"), strict=True):
             label = f"{name.split(',')[0]}, {model}"
-            axes[k % 3].semilogx(sizes, 100 * (models[model] - 1), style, color=f"C{k // 3}", label=label)
+            axes[k % 3].semilogx(sizes, 100 * (models[model] - 1), line, color=f"C{k // 3}", label=label)
     for panel, title in zip(axes, titles, strict=True):
         panel.axhline(0, color="0.3", linewidth=1)
         panel.set(xlabel="radius of one more grain, of the largest that fits", title=title)
     axes[0].set_ylabel("permeability, change in %")
-    axes[0].legend(fontsize=7)
-    figure.savefig(DOCS / "img" / "extremes_grain.png", dpi=120)
+    axes[0].legend()
+    figure.savefig(DOCS / "img" / "extremes_grain.png")
 
 
 def write(text: str) -> None:
@@ -585,7 +590,9 @@ def main() -> None:
     print(grain_table(found, sizes))
     if not (options.only or options.dry):
         write(tables(rows) + "\n" + grain_table(found, sizes))
-        draw_cases(rows)
+        done = [row for row in rows if not row.refusal]
+        draw_cases(done)
+        draw_lattices(done)
         draw_grains(found, sizes)
 
 

@@ -22,6 +22,7 @@ from porefv.coupling.coupling import Coupling
 from porefv.coupling.micromechanics import grain_strains, grain_stresses, layer_means
 from porefv.dem.dem import DEM
 from porefv.dem.plate import Plate
+from porefv.export.picture_style import PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.mesh.pore_mesh import PoreMesh
 
@@ -133,13 +134,10 @@ def main() -> None:
         plot(start.middles, rows, options.shown, load, curve, options.out)
 
 
+@style()
 def plot(middles: np.ndarray, rows: dict, shown: float, load: float, curve: np.ndarray, path: Path) -> None:
-    import matplotlib
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(10, 5.5), layout="constrained")
+    figure = new_figure(PictureSize(2000, 1100), layout="constrained")
+    left, right = figure.subplots(1, 2)
     stress, strain, pressure = rows[shown]
     fine = np.linspace(0.0, 1.0, 201)
     exact = terzaghi_pressure(2.0 * fine, shown)
@@ -160,7 +158,7 @@ def plot(middles: np.ndarray, rows: dict, shown: float, load: float, curve: np.n
     right.set(xlabel="strain of the layer, $10^{-3}$", ylabel="$\\Delta\\sigma'$ of the layer, kPa")
     right.grid(alpha=0.3)
     right.legend()
-    figure.savefig(path, dpi=120)
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Time and memory against the number of grains, from packing arrays to forces; beside it Yade, if installed.
 
-    python benchmarks/scale.py [--out docs/img/scale.png] [--yade-limit 160000] [SPHERES ...]
+    python benchmarks/scale.py [--out scale.png] [--yade-limit 160000] [SPHERES ...]
 
 Packings are n2000_s1 and n20000_s1 of data/packings and mirror images of the latter side by side. Every run is a
 process of its own, with compiled kernels loaded before the clock starts, on one thread and on all. Yade runs its
@@ -23,6 +23,7 @@ import numpy as np
 from yade_flow import run_yade
 
 from porefv.conductance.registry import conductance_model
+from porefv.export.picture_style import PictureSize, new_figure, style
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
@@ -145,13 +146,10 @@ def report(row: dict) -> None:
     print(flush=True)
 
 
+@style()
 def plot(rows: list[dict], path: Path) -> None:
-    import matplotlib
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(7, 5), layout="constrained")
+    figure = new_figure(PictureSize(1200, 900), layout="constrained")
+    axes = figure.subplots()
     for threads in rows[0]["ours"]:
         axes.loglog(
             [row["spheres"] for row in rows],
@@ -164,7 +162,7 @@ def plot(rows: list[dict], path: Path) -> None:
     axes.set(xlabel="spheres", ylabel="seconds, packing to forces")
     axes.grid(True, which="both", alpha=0.3)
     axes.legend()
-    figure.savefig(path, dpi=120)
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

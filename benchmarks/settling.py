@@ -2,21 +2,39 @@
 
 python benchmarks/settling.py                 the tables
 python benchmarks/settling.py --seeds 2       quicker
+python benchmarks/settling.py collapse        settlement in time at several viscosities
+python benchmarks/settling.py permeability    errors on grains that are held, with the conductances that go with pairs
+
+Up to a solid fraction of 0.25 grains are placed at random. Denser clouds are grown, and then mixed by Monte Carlo moves
+of hard spheres: growth leaves grains in contact.
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from porefv import Box, Fluid, Packing, Walls
+from porefv import Box, Fluid, Packing, PoreFlow, Walls
+from porefv.conductance.conductances import throat_conductances
 from porefv.coupling import Coupling
+from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
 from porefv.dem.dem import DEM
+from porefv.dem.growth import grow
+from porefv.dem.material import Material
 from porefv.dem.random_placement import cloud
 from porefv.dem.sizes import UniformSizes
+from porefv.resolved.reference import StokesReference
+from porefv.solvers.pressure_equation import solve_network
 
 SLIP = {"lateral": {"slip": True}}
+BOX = Box([0, 0, 0], [1, 1, 1])
+# Solid fraction up to which grains are placed at random; and moves of each grain, and their length over the radius,
+# that mix a denser cloud.
+PLACED, MOVES, LENGTH = 0.25, 300, 0.15
+# Times of a settlement, over that in which a grain alone falls by the height.
+PARTS = np.arange(1, 10) / 20.0
 
 
 def coupled(packing, walls=SLIP, roughness=0.02, pairs=True):
@@ -66,9 +84,24 @@ def richardson_zaki(c):
     return (1.0 - c) ** 4.65
 
 
+def dense_cloud(n, c, seed):
+    """Equal grains apart, mixed as hard spheres are (Metropolis et al. 1953)."""
+    grown = grow(n, UniformSizes(1.0), BOX, Material(friction_angle=0.0), porosity=1.0 - c, seed=seed).packing
+    radius = np.cbrt(c / (n * 4.0 / 3.0 * np.pi))
+    places, rng = grown.centres.copy(), np.random.default_rng(seed)
+    for _ in range(MOVES):
+        for k in range(n):
+            moved = places[k] + LENGTH * radius * rng.uniform(-1.0, 1.0, 3)
+            squares = ((places - moved) ** 2).sum(axis=1)
+            squares[k] = np.inf
+            if (abs(moved - 0.5) <= 0.5 - radius).all() and squares.min() >= 4.0 * radius**2:
+                places[k] = moved
+    return Packing(places, np.full(n, radius), BOX)
+
+
 def of_cloud(c, seed, n=300):
     """Common drag; mean, scatter and fastest of the settling speeds; smallest eigenvalue; in units of Stokes' drag."""
-    packing = cloud(n, UniformSizes(1.0), Box([0, 0, 0], [1, 1, 1]), 1.0 - c, seed)
+    packing = cloud(n, UniformSizes(1.0), BOX, 1.0 - c, seed) if c <= PLACED else dense_cloud(n, c, seed)
     coupling = coupled(packing)
     stokes = 6.0 * np.pi * packing.radii[0]
     pores = pore_resistance(coupling) / stokes
@@ -114,13 +147,91 @@ def jeffrey_onishi(gap, along):
     return np.log(1.0 / gap) / 3.0 + 0.9983 + 0.2737
 
 
+def settlement(viscosity, seed=1):
+    """Settlement of the mean grain over the height, at the times `PARTS` of the fall of a grain alone by the height.
+
+    200 grains of the immersed deposition of Catalano, Chareyre and Barthélemy (2014, section 4).
+    """
+    packing = cloud(200, UniformSizes(1.0), Box([0, 0, 0], [0.33, 0.33, 0.83]), 0.75, seed)
+    dem = DEM(packing, Material(15e6, 0.5, 30.0, 2600.0), gravity=(0.0, 0.0, -9.81))
+    weights = dem.masses * 1600.0 / 2600.0 * 9.81
+    dem.apply(np.outer(weights * 1000.0 / 1600.0, [0.0, 0.0, 1.0]))
+    walls = Walls.from_mapping({"z_max": {"pressure": 0.0, "free": True}, "lateral": {"slip": True}})
+    coupling = Coupling(dem, walls, Fluid(viscosity), pair_resistance=True, renewal=0.1)
+    height = packing.box.size[2]
+    alone = height * 6.0 * np.pi * viscosity * packing.radii[0] / weights[0]
+    found = []
+    for part in PARTS:
+        coupling.run(round(part * alone / dem.step) - coupling.effort.steps)
+        found.append((packing.centres - dem.positions)[:, 2].mean() / height)
+    return np.array(found)
+
+
+def print_collapse():
+    """Settlements at several viscosities, and how far each is from that at 100 Pa s."""
+    shown = np.isclose(PARTS[:, None], [0.1, 0.2, 0.3, 0.4]).any(axis=1)
+    print("| viscosity, Pa s | " + " | ".join(f"{part:.1f}" for part in PARTS[shown]) + " | largest difference |")
+    print("|---|---|---|---|---|---|")
+    basis = settlement(100.0)
+    for viscosity in (50.0, 100.0, 200.0, 1000.0):
+        found = settlement(viscosity) if viscosity != 100.0 else basis
+        numbers = " | ".join(f"{value:.4f}" for value in found[shown])
+        print(f"| {viscosity:.0f} | {numbers} | {100 * np.abs(found / basis - 1.0).max():.1f} % |", flush=True)
+
+
+def permeability_errors(reference):
+    """Relative errors of the permeability with section friction, and with the conductances that go with pairs."""
+    mesh, walls = reference.pore_mesh(), reference.walls
+    flow = PoreFlow(mesh, walls, Fluid(reference.viscosity))
+    narrow, alike = wall_reach(mesh, walls.slip), np.ones(6, bool)
+    without = throat_conductances(mesh, flow.conductance, alike, reference.viscosity)
+    conductances = (narrow * flow.conductances + (1.0 - narrow) * without) * growth_of_open_throats(mesh)
+    i, j = mesh.throats.pores.T
+    held = flow.imposed_pressures
+    most = np.nanmax(held)
+
+    def through(conductances):
+        pressure = solve_network(mesh.throats.pores, conductances, held, tolerance=1e-8).pressure
+        flux = conductances * (pressure[i] - pressure[j])
+        return flux[held[i] == most].sum() - flux[held[j] == most].sum()
+
+    plain = flow.permeability / reference.permeability
+    return plain - 1.0, plain * through(conductances) / through(flow.conductances) - 1.0
+
+
+def print_permeability():
+    """Errors over the cases of data/reference/stokes, by lateral walls."""
+    folder = Path(__file__).parent.parent / "data" / "reference" / "stokes"
+    columns = "lateral walls", "cases", "rms", "worst", "with pairs: rms", "worst", "changed by more than 0.3 points"
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
+    for kind, title in (("symmetry", "symmetry"), ("no_slip", "no-slip")):
+        paths = sorted(folder.glob(f"*_{kind}.json"))
+        found = {path.stem: permeability_errors(StokesReference.read(path)) for path in paths}
+        errors = 100.0 * np.array(list(found.values()))
+        rms, worst = np.sqrt((errors**2).mean(axis=0)), np.abs(errors).max(axis=0)
+        changed = np.abs(errors[:, 1] - errors[:, 0]) > 0.3
+        numbers = " | ".join(f"{rms[k]:.1f} % | {worst[k]:.1f} %" for k in range(2))
+        print(f"| {title} | {len(found)} | {numbers} | {changed.sum()} |")
+        for name, (before, after) in found.items():
+            if abs(after - before) > 0.003:
+                print(f"  {name} {100 * before:+.1f} % {100 * after:+.1f} %")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="?", choices=["tables", "collapse", "permeability"], default="tables")
     parser.add_argument("--seeds", type=int, default=5)
-    seeds = parser.parse_args().seeds
+    options = parser.parse_args()
+    if options.what == "collapse":
+        print_collapse()
+        return
+    if options.what == "permeability":
+        print_permeability()
+        return
+    seeds = options.seeds
     print("| c | common drag / law | mean speed / RZ | scatter / mean | fastest / mean | smallest eigenvalue |")
     print("|---|---|---|---|---|---|")
-    for c in (0.01, 0.05, 0.10, 0.15, 0.20, 0.25):
+    for c in (0.01, 0.05, 0.10, 0.15, 0.20, 0.25, 0.35, 0.45):
         found = np.array([of_cloud(c, seed) for seed in range(1, seeds + 1)])
         common, mean, scatter, _, _ = found.mean(axis=0)
         print(

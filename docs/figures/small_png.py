@@ -24,4 +24,5 @@ def save(figure: Figure, name: str) -> None:
 def shrink(source: Path | io.BytesIO, path: Path, method: Image.Quantize = Image.Quantize.MAXCOVERAGE) -> None:
     """Write a picture with 256 colours; MAXCOVERAGE keeps the ends of scales, MEDIANCUT shades."""
     image = Image.open(source).convert("RGB")
-    image.quantize(256, method=method, dither=Image.Dither.NONE).save(path, optimize=True)
+    # Refined by k-means: pale shades would otherwise take colours of other things.
+    image.quantize(256, method=method, kmeans=3, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -85,6 +85,26 @@ def test_plot_refuses_what_it_cannot_draw(solved, tmp_path, capsys, options, sai
     assert not (tmp_path / "a.png").exists()
 
 
+def test_plot_solves_the_flow_again_for_paths_and_refuses_one_that_changed(write_scene, tmp_path, capsys):
+    scene = write_scene(tmp_path, "n25_s1.csv")
+    assert main(["solve", str(scene), "--quiet"]) == 0
+    picture = ["plot", str(tmp_path / "results"), "--what", "paths", "--size", "400x300", "--dpi", "50", "--out"]
+    assert main([*picture, str(tmp_path / "a.png")]) == 0
+    assert "200 paths of particles" in capsys.readouterr().err
+    changed = scene.read_text(encoding="utf-8").replace("pressure = 1.0", "pressure = 2.0")
+    scene.write_text(changed, encoding="utf-8")
+    assert main([*picture, str(tmp_path / "b.png")]) == 2
+    assert "has changed since" in capsys.readouterr().err
+    scene.unlink()
+    assert main([*picture, str(tmp_path / "b.png")]) == 2
+    assert f"there is no {scene}" in capsys.readouterr().err
+
+
+def test_plot_of_paths_of_results_without_a_scene_names_the_remedy(solved, tmp_path, capsys):
+    assert main(["plot", str(solved), "--what", "paths", "--out", str(tmp_path / "a.png")]) == 2
+    assert 'flow.plot("paths")' in capsys.readouterr().err
+
+
 def test_plot_draws_a_packing_file_and_refuses_what_needs_a_flow(tmp_path, capsys):
     packing = str(PACKINGS / "n25_s1.csv")
     assert main(["plot", packing, "--what", "section", "--out", str(tmp_path / "a.svg")]) == 0

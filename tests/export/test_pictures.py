@@ -119,7 +119,7 @@ def test_a_network_without_open_throats_says_why():
 
 
 def test_paths_are_those_of_a_flow(flow):
-    assert "200 paths of particles, drawn by flux" in picture(flow, "paths", **SMALL).notes
+    assert "200 paths of particles, sampled by flux" in picture(flow, "paths", **SMALL).notes
     with pytest.raises(InputError, match="needs the paths of a flow"):
         flow.mesh.plot("paths", **SMALL)
     walls = Walls(x_min=Wall(pressure=3.0), x_max=Wall(pressure=3.0))
@@ -195,7 +195,9 @@ def test_html_holds_the_scene_and_the_scale_of_colours(flow, tmp_path):
     pytest.importorskip("trame_pyvista")
     flow.plot(title="A & B", **SMALL).save(tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
-    assert "force on a grain" in text and "A &amp; B" in text and text.rstrip().endswith("</html>")
+    assert "force on a grain" in text and "<title>A &amp; B</title>" in text and text.rstrip().endswith("</html>")
+    # The viewer replaces what is in the element of this class; without one, in the body, and the scales with it.
+    assert text.index('<div class="content">') < text.index("OfflineLocalView.load") < text.index('class="porefv"')
 
 
 def test_a_notebook_shows_the_picture(flow):
@@ -211,7 +213,12 @@ def test_a_notebook_shows_the_picture(flow):
     ({"what": "section", "at": 1.5}, "between 0 and 1 m, not at 1.5 m"),
     ({"what": "section", "axis": "w"}, "must be x, y or z"),
     ({"size": (10, 300)}, "100 to 10 000 pixels"),
+    ({"size": 800}, "a size is a width and a height"),
+    ({"size": "800x600"}, "a size is a width and a height"),
+    ({"size": (800.5, 600)}, "whole numbers of pixels"),
     ({"dpi": 0}, "30 to 1200 pixels per inch"),
+    ({"dpi": "high"}, "a number of pixels per inch"),
+    ({"what": "section", "at": "top"}, "a number of metres, not 'top'"),
     ({"size": (400, 300)}, r"2 x 1.5 inches; the letters need 3.5 x 2.5"),
 ])  # fmt: skip
 def test_what_cannot_be_drawn_is_refused(flow, options, said):

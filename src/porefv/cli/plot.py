@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Kinds of pictures: as `porefv.results.drawing.PICTURES`, which is slow to import.
 KINDS = (
-    "forces", "pressure", "network", "throats", "packing", "section", "velocity",
+    "forces", "pressure", "network", "throats", "paths", "packing", "section", "velocity",
     "profile", "pore_sizes", "constriction_sizes",
 )  # fmt: skip
 _OF_A_PACKING = ("packing", "section")
@@ -77,12 +77,26 @@ def run(options: argparse.Namespace) -> None:
         else:
             if options.what in KINDS[-3:] and {"axis", "at"} & set(given):
                 raise InputError(f"--axis and --at are those of section and velocity; {options.what} has none")
-            from porefv.results.drawing import draw
-            from porefv.results.reading import read
-
-            picture = draw(read(options.results), options.out, options.what, **given)
+            picture = _draw_results(options.results, options.out, options.what, given)
     for note in picture.notes:
         print(f"porefv plot: {note}", file=sys.stderr)
+
+
+def _draw_results(directory: Path, out: Path, what: str | None, given: dict[str, Any]) -> Picture:
+    from porefv.results.drawing import draw, formats_of, title_of
+    from porefv.results.reading import read
+    from porefv.system.atomic_files import picture_target
+
+    results = read(directory)
+    if what != "paths":
+        return draw(results, out, what, **given)
+    from porefv.export.pictures import picture
+    from porefv.scenes.flow_of_results import flow_of_results
+
+    picture_target(out, formats_of(what))
+    found = picture(flow_of_results(results), what, title=title_of(results), **given)
+    found.save(out)
+    return found
 
 
 def _draw_packing(path: Path, out: Path, what: str, given: dict[str, Any]) -> Picture:

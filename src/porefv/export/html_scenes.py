@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from signal import getsignal, signal
 from typing import TYPE_CHECKING, Any
@@ -19,12 +22,22 @@ if TYPE_CHECKING:
 
 # Angle of view of vtk.js [degrees].
 _VIEW_ANGLE = 30.0
-# The scales of colours lie over the scene, and let the mouse through.
-_LEGEND = """<div style="position:fixed;top:0;right:0;height:100%;z-index:10;pointer-events:none">
-<style>.porefv svg {{ height: 100vh; width: auto; }}</style><div class="porefv">
+# The viewer puts the scene in place of what it finds in the element of this class, or else in the body. The scales of
+# colours lie over the scene, and let the mouse through. In a narrow window both are as wide as it.
+_SCENE = """
+<style>
+.content, .porefv svg {{ height: min(100vh, {height:.4f} * 100vw); }}
+.content {{ position: absolute; top: 0; left: 0; right: 0; }}
+.porefv {{ position: fixed; top: 0; right: 0; z-index: 10; pointer-events: none; }}
+.porefv svg {{ width: auto; display: block; }}
+</style>
+<div class="content"></div>
+"""
+_LEGEND = """<div class="porefv">
 {svg}
-</div></div>
-</body>"""
+</div>
+"""
+_TITLE = re.compile("<title>.*?</title>", re.DOTALL)
 
 
 @contextmanager
@@ -39,6 +52,20 @@ def _signals_kept() -> Iterator[None]:
                 signal(number, handler)
 
 
+@contextmanager
+def _nothing_downloaded() -> Iterator[None]:
+    """The server would load trame-vtklocal, which downloads files that the page does not use; it can do without."""
+    name = "trame.widgets.vtklocal"
+    loaded = sys.modules.get(name)
+    sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules[name]
+        if loaded is not None:
+            sys.modules[name] = loaded
+
+
 def _see_in_perspective(camera: Any) -> None:
     """What a browser is given of a camera is its place alone: put it where as much is seen in vtk.js's perspective."""
     focus, position = np.array(camera.focal_point), np.array(camera.position)
@@ -50,8 +77,8 @@ def _see_in_perspective(camera: Any) -> None:
     camera.clipping_range = (0.05, 20.0)
 
 
-def write_html(plotter: Any, legend: Figure, path: Path) -> None:
-    """Write the scene of a plotter, with a figure that explains it, as one file.
+def write_html(plotter: Any, legend: Figure, path: Path, title: str = "") -> None:
+    """Write the scene of a plotter, with a figure that explains it, as one file with a title.
 
     Raises
     ------
@@ -60,13 +87,17 @@ def write_html(plotter: Any, legend: Figure, path: Path) -> None:
     """
     ensure_installed("trame_pyvista", "trame-pyvista", "Writing an HTML picture")
     _see_in_perspective(plotter.camera)
-    with _signals_kept():
+    with _signals_kept(), _nothing_downloaded():
         page = plotter.trame.export_html(None).getvalue()
     plotter.close()
     drawing = io.StringIO()
     legend.savefig(drawing, format="svg", metadata={"Date": None})
     svg = drawing.getvalue()
     svg = svg[svg.index("<svg") :]
+    page = _TITLE.sub(lambda _: f"<title>{escape(title or 'porefv')}</title>", page, count=1)
+    head, body, page = page.partition("<body>")
     before, end, after = page.rpartition("</body>")
-    assert end, "the page of trame-pyvista has a body"
-    path.write_text(before + _LEGEND.format(svg=svg) + after, encoding="utf-8")
+    assert body and end, "the page of trame-pyvista has a body"
+    width, height = legend.get_size_inches()
+    scene = _SCENE.format(height=height / width)
+    path.write_text(f"{head}{body}{scene}{before}{_LEGEND.format(svg=svg)}{end}{after}", encoding="utf-8")

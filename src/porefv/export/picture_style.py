@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from numbers import Real
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -67,6 +68,23 @@ class PictureSize(NamedTuple):
     width: int = 1600
     height: int = 1200
     dpi: float = 200.0
+
+    @classmethod
+    def of(cls, size: Sequence[float], dpi: float | None) -> PictureSize:
+        """The size of width and height [pixels], with the usual resolution if none is given.
+
+        Raises
+        ------
+        InputError
+            If these are no numbers, or no picture can have them.
+        """
+        if isinstance(size, str) or not isinstance(size, Sequence | np.ndarray) or len(size) not in (2, 3):
+            raise InputError(f"a size is a width and a height in pixels, such as (1600, 1200), not {size!r}")
+        if any(isinstance(side, bool) or not isinstance(side, int | np.integer) for side in size[:2]):
+            raise InputError(f"the width and height of a picture must be whole numbers of pixels, not {size!r}")
+        if dpi is not None and (isinstance(dpi, bool) or not isinstance(dpi, Real)):
+            raise InputError(f"the resolution must be a number of pixels per inch, not {dpi!r}")
+        return cls(int(size[0]), int(size[1]), SIZE.dpi if dpi is None else float(dpi)).check()
 
     @property
     def inches(self) -> tuple[float, float]:

@@ -121,7 +121,7 @@ def draw(
 ) -> Picture:
     """A picture of data; parameters and errors as of `picture`."""
     check_kind(what)
-    size = PictureSize(*size[:2], SIZE.dpi if dpi is None else dpi).check()
+    size = PictureSize.of(size, dpi)
     if what in SECTIONS:
         return section_picture(data, what, axis=axis, at=at, title=title, size=size)
     if axis is not None or at is not None:
@@ -143,8 +143,8 @@ def _picture_3d(data: PictureData, what: str, title: str, size: PictureSize) -> 
         with style():
             legend = new_figure(size)
             legend.patch.set_alpha(0.0)
-            _explain(legend, size, title, scene.colours, (*scene.notes, f"the bar has {marks['bar'].text}"))
-        write_html(plotter, legend, path)
+            _explain(legend, size, title, scene.colours, (*scene.notes, f"the bar is {marks['bar'].text} long"))
+        write_html(plotter, legend, path, title)
 
     with style():
         figure = new_figure(size)

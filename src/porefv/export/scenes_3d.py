@@ -214,7 +214,7 @@ class Scene:
         # A particle that stays long in a corner would leave one colour to all others.
         scale = Colours.of_most("time since entry", "s", paths.residence_times, 0.9, TIMES)
         self.colours.append(scale)
-        self.notes.append(f"{counted(len(paths), 'path')} of particles, drawn by flux")
+        self.notes.append(f"{counted(len(paths), 'path')} of particles, sampled by flux")
         radius = min(_PATH * float(self._radii.mean()), _PATH_OF_BOX)
         lines = self.pv.PolyData(self.view.place(paths.points))
         sizes = np.diff(paths.offsets)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -61,6 +62,8 @@ class Plane:
             raise InputError(f"the axis of a section must be x, y or z, not {axis!r}")
         normal = {2: 1, 1: 2, 0: 2}[upright] if axis is None else "xyz".index(axis)
         low, high = box.lower[normal], box.upper[normal]
+        if at is not None and (isinstance(at, bool) or not isinstance(at, Real)):
+            raise InputError(f"the place of a section must be a number of metres, not {at!r}")
         at = 0.5 * (low + high) if at is None else float(at)
         if not low < at < high:
             raise InputError(

@@ -86,9 +86,10 @@ class PoreFlow(FixedInputs):
 
     Examples
     --------
-    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
-    >>> print(f"{flow.permeability:.3g} m², {flow.inflow:.3g} m³/s")
-    0.00019 m², 0.19 m³/s
+    >>> oil = Fluid(viscosity=10.0, density=970.0)
+    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"), oil)
+    >>> print(f"{flow.permeability:.3g} m², {flow.inflow:.3g} m³/s, Reynolds number {flow.reynolds:.1g}")
+    0.00019 m², 1.9e-05 m³/s, Reynolds number 0.0006
     """
 
     def __init__(
@@ -534,7 +535,7 @@ class PoreFlow(FixedInputs):
 
         Examples
         --------
-        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"), Fluid(viscosity=10.0))
         >>> found = flow.paths(1000, seed=1)
         >>> print(f"path tortuosity {found.path_tortuosity:.2f} ± {found.path_tortuosity_scatter:.2f}")
         path tortuosity 1.27 ± 0.17
@@ -571,7 +572,7 @@ class PoreFlow(FixedInputs):
 
         Examples
         --------
-        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+        >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"), Fluid(viscosity=10.0))
         >>> flow.plot("section", axis="z").save("section.svg")
         """
         from porefv.export.pictures import picture

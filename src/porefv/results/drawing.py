@@ -23,9 +23,8 @@ from porefv.system.atomic_files import picture_target
 if TYPE_CHECKING:
     import pyvista
 
-# What `porefv plot --what` draws of results.
-# Results have no paths: they are drawn of a flow.
-PICTURES = (*(kind for kind in pictures.KINDS if kind != "paths"), *QUANTITY_PICTURES)
+# What `porefv plot --what` draws of results. Results hold no paths: `porefv plot` solves the flow again for them.
+PICTURES = (*pictures.KINDS, *QUANTITY_PICTURES)
 
 
 def draw(results: Results, path: str | PathLike[str], what: str | None = None, **options: Any) -> Picture:
@@ -92,12 +91,17 @@ def results_picture(
     if what in QUANTITY_PICTURES:
         return quantity_picture(results, what, size=size, dpi=dpi)
     data = _data(results, what)
+    return pictures.draw(data, what, axis=axis, at=at, title=title_of(results), size=size, dpi=dpi)
+
+
+def title_of(results: Results) -> str:
+    """The title of a picture: scene, number of spheres and permeability."""
     summary = results.summary
     title = f"{Path(summary['scene']).stem}: " if summary["scene"] else ""
     title += f"{summary['packing']['spheres']} spheres"
     if "permeability" in summary:
         title += f",  k = {summary['permeability']:.4g} m²"
-    return pictures.draw(data, what, axis=axis, at=at, title=title, size=size, dpi=dpi)
+    return title
 
 
 def _data(results: Results, what: str) -> PictureData:
@@ -141,6 +145,11 @@ def _by_pore(pores: pyvista.UnstructuredGrid, name: str) -> np.ndarray | None:
 
 
 def _remedy(results: Results, name: str) -> str:
+    if name == "paths":
+        return (
+            f"{results.directory} holds no paths of particles: porefv plot --what paths solves the flow of the scene "
+            'again for them, and in Python flow.plot("paths") draws them'
+        )
     quantity = {"force": "forces", "velocity": "pressure"}.get(name, name)
     return (
         f'{results.directory} has no {name}: add "{quantity}" to the quantities in the scene\'s [output], and solve '

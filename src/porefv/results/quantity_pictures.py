@@ -44,7 +44,7 @@ def quantity_picture(
     """
     if quantity not in QUANTITY_PICTURES:
         raise InputError(f"there is no picture of {quantity!r}; there are: {', '.join(QUANTITY_PICTURES)}")
-    size = PictureSize(*size[:2], SIZE.dpi if dpi is None else dpi).check()
+    size = PictureSize.of(size, dpi)
     with style():
         figure = new_figure(size, layout="constrained")
         axes = figure.subplots(1, 2 if quantity == "profile" else 1, sharey=True, squeeze=False)[0]

@@ -157,7 +157,11 @@ def read(directory: str | PathLike[str]) -> Results:
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
+        if directory.suffix == ".toml":
+            raise InputError(f"{directory} is a scene: solve it first, and give its results directory") from None
         reason = error.strerror if isinstance(error, OSError) else f"summary.json is damaged ({error})"
+        if isinstance(error, FileNotFoundError) and directory.is_dir():
+            reason = "it has no summary.json"
         raise InputError(f"{directory} holds no results of porefv solve: {reason}") from None
     if not isinstance(summary, dict) or "packing" not in summary:
         raise InputError(f"{directory} holds no results of porefv solve: its summary.json is another program's")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -14,6 +15,7 @@ from porefv.coupling.exchange import EXCHANGES
 from porefv.coupling.walls_in_time import WallHistories, WallHistory
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
+from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.packing.box import Box
 from porefv.packing.packing import Packing
@@ -29,7 +31,7 @@ from porefv.scenes.shared_tables import (
 )
 from porefv.scenes.stage import Stage
 from porefv.scenes.table import MadeFrom, OneOf, Scene, Table
-from porefv.scenes.values import Choice, Fraction, Limits, ScenePath, Seconds, Vector, Whole, key
+from porefv.scenes.values import Choice, Fraction, Limits, Numbers, ScenePath, Seconds, Vector, Whole, key
 from porefv.scenes.walls_in_time_tables import FirstWallsTable, Times
 from porefv.system.tables import TABLE_FORMATS
 
@@ -37,6 +39,12 @@ AXES = ("x", "y", "z")
 # Intervals of the series in a stage of given duration, and steps between rows of one without.
 ROWS, ROW_STEPS = 200, 100
 
+
+def _increase(places: Sequence[float]) -> bool:
+    return len(places) > 0 and all(a < b for a, b in itertools.pairwise(places))
+
+
+Gauges = Annotated[tuple[float, ...], Numbers("increasing places in m, such as [0.1, 0.2]", holds=_increase)]
 Moments = Annotated[
     float | tuple[float, ...],
     OneOf(
@@ -101,7 +109,12 @@ class SimulationOutput(Table):
     )
     profiles: Moments | None = key("interval between profiles, or a list of times", None, unit="s")
     layers: Annotated[int, Whole(least=1)] = key("number of layers of the profiles, equally thick", 10)
-    axis: Annotated[str, Choice(AXES)] = key("axis across the layers, and of the permeameter", "z")
+    axis: Annotated[str, Choice(AXES)] = key("axis across the layers and gauges, and of the permeameter", "z")
+    gauges: Gauges | None = key(
+        "increasing places along the `axis` at which the [pressure is measured](#gauges) for each row of the series",
+        None,
+        unit="m",
+    )
     frames: Moments | None = key("interval between frames for ParaView, or a list of times", None, unit="s")
     contacts: bool = key("whether frames have the contacts, too", False)
     velocity: bool = key("whether frames have the velocity in the pores, too", False)
@@ -210,6 +223,13 @@ class SimulationScene(Scene):
                 raise refused(f"two stages are called '{name}'", k, "name")
         return complete
 
+    @field_validator("output")
+    @classmethod
+    def _gauges_need_fluid(cls, output: SimulationOutput, info: ValidationInfo) -> SimulationOutput:
+        if output.gauges is not None and info.data.get("fluid", ...) is None:
+            raise refused("gauges measure the pressure of the fluid, and there is none; give a table [fluid]", "gauges")
+        return output
+
     @property
     def saving(self) -> Saving:
         """Interval between checkpoints."""
@@ -228,7 +248,25 @@ class SimulationScene(Scene):
         return self.packing.read(self.path, self.box)
 
     def grains(self, packing: Packing | None = None) -> DEM:
-        """The grains at the start, between walls that stand; of the packing, which is read if it is not given."""
-        return DEM(
-            self.read_packing() if packing is None else packing, self.material, gravity=self.gravity, step=self.step
-        )
+        """The grains at the start, between walls that stand; of the packing, which is read if it is not given.
+
+        Raises
+        ------
+        InputError
+            If the packing cannot be read, or a gauge is outside its box.
+        """
+        packing = self.read_packing() if packing is None else packing
+        grains = DEM(packing, self.material, gravity=self.gravity, step=self.step)
+        self._check_gauges(grains.box)
+        return grains
+
+    def _check_gauges(self, box: Box) -> None:
+        """InputError for a gauge outside the box."""
+        axis = self.output.axis
+        lower, upper = (float(corner[AXES.index(axis)]) for corner in (box.lower, box.upper))
+        for place in self.output.gauges or ():
+            if not lower <= place <= upper:
+                raise InputError(
+                    f"{self.path or 'the scene'}: [output] gauges: {place:.6g} m is outside the box, which goes from "
+                    f"{lower:.6g} to {upper:.6g} m along {axis}"
+                )

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
 
 from porefv.conductance.model import ConductanceModel
 from porefv.coupling.coupling import Coupling
-from porefv.coupling.micromechanics import layer_means
 from porefv.coupling.validity import Validity
 from porefv.dem.dem import DEM
+from porefv.flow.plane_pressures import PlanePressures
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Wall, Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS
+from porefv.packing.layers import layer_edges, layer_porosities
 
 _ENERGIES = ("kinetic", "elastic", "potential", "sliding", "damping", "walls", "applied", "balance")
 _POWERS = ("grains", "walls", "dissipation", "boundary", "pairs", "imbalance", "weight", "error")
@@ -36,7 +38,17 @@ FLUID_COLUMNS = (
     *(f"power_{name}" for name in _POWERS), "mass_imbalance",
     "reynolds_max", "reynolds_mean", "stokes_number", "iterations", "meshes",
 )  # fmt: skip
-PROFILE_COLUMNS = ("step", "time", "stage", "layer", "lower", "upper", "pressure", "effective_stress")
+PROFILE_COLUMNS = (
+    "step", "time", "stage", "layer", "lower", "upper", "pressure", "effective_stress", "total_stress", "porosity",
+)  # fmt: skip
+
+
+def gauge_columns(gauges: int) -> tuple[str, ...]:
+    """Columns of `gauge_row`, for so many gauges."""
+    return (
+        *(f"gauge_pressure_{k + 1}" for k in range(gauges)),
+        *(f"gauge_porosity_{k + 1}" for k in range(gauges - 1)),
+    )
 
 
 def grain_row(dem: DEM, coupling: Coupling | None, sizes: np.ndarray, residual: float) -> dict[str, float]:
@@ -142,6 +154,38 @@ def unbalanced(dem: DEM, coupling: Coupling | None) -> float:
     return with_fluid
 
 
+# ---- gauges -----------------------------------------------------------------------------------------------------
+
+
+def gauge_row(dem: DEM, coupling: Coupling | None, axis: int, places: Sequence[float]) -> dict[str, float]:
+    """`gauge_columns`: pressures at places along an axis [m], and porosities between neighbouring ones.
+
+    Nothing is measured at, or next to, a gauge that a wall has passed, nor pressures without a fluid.
+
+    Parameters
+    ----------
+    dem : DEM
+    coupling : Coupling or None
+        None: without a fluid.
+    axis : int
+        0, 1 or 2.
+    places : sequence of float
+        Increasing [m].
+    """
+    lower, upper = dem.box.lower[axis], dem.box.upper[axis]
+    at = np.array(places)
+    (inside,) = np.nonzero((lower <= at) & (at <= upper))
+    if not len(inside):
+        return {}
+    row: dict[str, float] = {}
+    if coupling is not None:
+        found = PlanePressures.of(coupling.mesh, coupling.cell_pressure, axis).at(at[inside])
+        row |= {f"gauge_pressure_{k + 1}": pressure for k, pressure in zip(inside, found.tolist(), strict=True)}
+    edges = np.unique([lower, *at[inside], upper])
+    porosities = layer_porosities(dem.packing, axis, edges)
+    return row | {f"gauge_porosity_{k + 1}": float(porosities[edges.searchsorted(at[k])]) for k in inside[:-1]}
+
+
 # ---- profiles ---------------------------------------------------------------------------------------------------
 
 
@@ -158,22 +202,17 @@ def profile_rows(dem: DEM, coupling: Coupling | None, axis: int, layers: int) ->
     layers : int
         Number of layers.
     """
-    edges = np.linspace(dem.box.lower[axis], dem.box.upper[axis], layers + 1)
-    pressures = np.full(layers, np.nan)
+    edges = layer_edges(dem.box, axis, layers)
+    stresses, porosities = layer_stresses(dem, axis, edges), layer_porosities(dem.packing, axis, edges)
+    pressures, total = np.full(layers, np.nan), stresses
     if coupling is not None:
-        mesh = coupling.mesh
-        # Pressures are those at the Laguerre vertices, of which some lie a little beyond the walls.
-        places = np.clip(mesh.vertices[:, axis], edges[0], edges[-1])
-        pressures = layer_means(places, coupling.cell_pressure, mesh.cell_volumes, edges)
-        # A layer of clear fluid may be thinner than its cells, and hold no vertex.
-        for k in np.flatnonzero(np.isnan(pressures)):
-            nearest = np.argmin(np.abs(places - 0.5 * (edges[k] + edges[k + 1])))
-            pressures[k] = coupling.cell_pressure[nearest]
-    stresses = layer_stresses(dem, axis, edges)
+        pressures = PlanePressures.of(coupling.mesh, coupling.cell_pressure, axis).means(edges)
+        total = pressures + stresses
     return [
         {
             "step": dem.steps, "time": dem.time, "layer": k + 1, "lower": edges[k], "upper": edges[k + 1],
-            "pressure": pressures[k], "effective_stress": stresses[k],
+            "pressure": pressures[k], "effective_stress": stresses[k], "total_stress": total[k],
+            "porosity": porosities[k],
         }
         for k in range(layers)
     ]  # fmt: skip

@@ -16,7 +16,6 @@ from porefv.export.picture_style import (
     AXIS_COLOURS,
     FONTS,
     INK,
-    SIZE,
     PictureSize,
     label_in_unit,
     new_figure,
@@ -24,6 +23,7 @@ from porefv.export.picture_style import (
 )
 from porefv.packing.box import WALLS
 from porefv.scenes.simulation_scene import AXES, SimulationScene
+from porefv.simulation.gauge_picture import Gauges, draw_gauges, draw_stress_profiles
 from porefv.simulation.laboratory_tests import LaboratoryTests, Oedometer, Triaxial
 from porefv.simulation.reading import read_profiles, read_series
 from porefv.simulation.run_record import RunRecord, read_record
@@ -71,7 +71,9 @@ def series_picture(
     """The picture, a `matplotlib.figure.Figure`; errors as `draw_series`.
 
     Over a stage of one-dimensional consolidation there is Terzaghi's solution, and below a triaxial test there are its
-    stresses and strains: see `porefv.simulation.laboratory_tests`.
+    stresses and strains: see `porefv.simulation.laboratory_tests`. A run with gauges has diagrams of these, and of
+    total and effective stress and pressure over the place, instead of the pressure by layer:
+    see `porefv.simulation.gauge_picture`.
 
     Parameters
     ----------
@@ -86,16 +88,22 @@ def series_picture(
         raise InputError(f"{directory} has no rows to draw yet")
     wet = "mean_pressure" in (series.dtype.names or ())
     profiles = read_profiles(directory) if (Path(directory) / PROFILES).is_file() else None
-    tests = LaboratoryTests(SimulationScene.from_record(record.scene), record)
+    scene = SimulationScene.from_record(record.scene)
+    tests, gauges = LaboratoryTests(scene, record), Gauges.of(scene, series)
     axis = StageAxis.of(record.spans, tests.dry, float(series["time"][-1]))
     oedometers, triaxial = tests.oedometers(series), tests.triaxial()
-    rows = 2 if wet or profiles is not None else 1
-    all_rows = rows + (triaxial is not None)
+    by_gauges = profiles if gauges is not None else None
+    profiles = profiles if gauges is None or oedometers else None
+    # Of walls that stand there is nothing to see, where something else is.
+    strained = not wet or any((series[f"strain_{name}"] != 0.0).any() for name in AXES)
+    in_time = 1 + wet + strained
+    panels = in_time + (profiles is not None)
+    rows = -(-panels // 2)
+    all_rows = rows + (gauges is not None) + (by_gauges is not None) + (triaxial is not None)
     size = size or (2000, 700 * all_rows)
     with style():
-        figure = new_figure(PictureSize(*size, SIZE.dpi if dpi is None else dpi).check(), layout="constrained")
+        figure = new_figure(PictureSize.of(size, dpi), layout="constrained")
         grid = figure.add_gridspec(all_rows, 6)
-        panels = (3 if wet else 2) + (profiles is not None)
         places = [grid[row, left : left + 3] for row in range(rows) for left in (0, 3)]
         if panels % 2:
             places[panels - 1] = grid[rows - 1, :]
@@ -103,8 +111,9 @@ def series_picture(
         if wet:
             _pressures(next(axes), series, oedometers)
         _stresses(next(axes), series, wet)
-        _strains(next(axes), series, oedometers)
-        for ax in figure.axes[: 3 if wet else 2]:
+        if strained:
+            _strains(next(axes), series, oedometers)
+        for ax in figure.axes[:in_time]:
             axis.apply(ax)
             ax.grid(alpha=0.3)
             ax.legend()
@@ -112,6 +121,15 @@ def series_picture(
             _profiles(next(axes), profiles, record, tests, oedometers)
         for ax in axes:
             ax.set_axis_off()
+        if gauges is not None:
+            pair = [figure.add_subplot(grid[rows, left : left + 3]) for left in (0, 3)]
+            draw_gauges(pair, gauges)
+            for ax in pair:
+                axis.apply(ax)
+                ax.grid(alpha=0.3)
+        if by_gauges is not None:
+            three = [figure.add_subplot(grid[rows + 1, left : left + 2]) for left in (0, 2, 4)]
+            draw_stress_profiles(three, by_gauges, scene.output.axis)
         if triaxial is not None:
             below = [figure.add_subplot(grid[-1, left : left + 2]) for left in (0, 2, 4)]
             _triaxial(below, triaxial.curves(series), triaxial, record)

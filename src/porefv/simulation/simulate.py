@@ -105,7 +105,7 @@ def _run(scene: SimulationScene, force: bool, resume: bool, progress: Progress) 
         running = _Run(scene, record, dem, None, progress)
     else:
         dem, coupling = record.load(directory, scene.coupling.conductance)
-        record.scene, record.path = dict(scene.data), _path_of(scene)
+        record.scene, record.path, record.status = dict(scene.data), _path_of(scene), RUNNING
         running = _Run(scene, record, dem, coupling, progress)
     try:
         with _interruptions(running):
@@ -239,6 +239,7 @@ class _Run:
             begin(self.directory, record)
         tidy(self.directory, point)
         columns = measurements.GRAIN_COLUMNS + (measurements.FLUID_COLUMNS if scene.fluid else ())
+        columns += measurements.gauge_columns(len(output.gauges or ()))
         series = point.series if point else {}
         self._series = Series(self.directory / SERIES, columns, series.get(SERIES))
         self._profiles: Series | None = None
@@ -400,6 +401,8 @@ class _Run:
                 validity = coupling.validity
                 numbers |= measurements.fluid_row(coupling, dem, validity)
                 self._note_validity(k, coupling, validity)
+            if self.scene.output.gauges is not None:
+                numbers |= measurements.gauge_row(dem, coupling, self._axis, self.scene.output.gauges)
             self._series.add(numbers | {"stage": k + 1})
         if self._profiles is not None and self._profile_times.due(dem.steps, ended):
             for layer in measurements.profile_rows(dem, coupling, self._axis, self.scene.output.layers):

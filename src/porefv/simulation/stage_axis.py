@@ -91,6 +91,7 @@ class StageAxis:
         from matplotlib.ticker import FixedLocator, MaxNLocator
 
         step = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, max(float(np.ptp(self.places)), 1e-300))[1]
-        ticks = np.arange(np.ceil(self.ends[0] / step - 1e-9), self.ends[-1] / step + 1e-9) * step
+        # Not the negative zero that `ceil` gives, which would be written with its sign.
+        ticks = (np.arange(np.ceil(self.ends[0] / step - 1e-9), self.ends[-1] / step + 1e-9) + 0.0) * step
         inside = np.searchsorted(self.ends, ticks, side="right").clip(1, len(self.folded)) - 1
         ax.xaxis.set_major_locator(FixedLocator(ticks[~self.folded[inside]]))

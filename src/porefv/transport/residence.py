@@ -95,8 +95,8 @@ def residence_time(flow: PoreFlow, diffusivity: ArrayLike = 0.0) -> Residence:
 
     Examples
     --------
-    >>> from porefv import Packing, PoreFlow, Walls
-    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"))
+    >>> from porefv import Fluid, Packing, PoreFlow, Walls
+    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"), Fluid(viscosity=10.0))
     >>> found = residence_time(flow)
     >>> bool(abs(found.mean * flow.inflow / found.volume - 1.0) < 1e-10)
     True

@@ -89,9 +89,10 @@ class Solute:
 
     Examples
     --------
-    >>> from porefv import Packing, PoreFlow, Walls
-    >>> tracer = Solute(PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y")))
-    >>> leaving = tracer.advance(0.1, 100)
+    >>> from porefv import Fluid, Packing, PoreFlow, Walls
+    >>> flow = PoreFlow(Packing.read("data/packings/n25_s1.csv"), Walls.along("y"), Fluid(viscosity=10.0))
+    >>> tracer = Solute(flow)
+    >>> leaving = tracer.advance(1000.0, 100)
     >>> round(float(leaving[-1]), 3), tracer.balance.largest_imbalance < 1e-14
     (0.99, True)
     """

@@ -55,7 +55,7 @@ def show(results: str) -> Any:
     if throats is not None:
         _show_throats(view, throats)
     view.CameraFocalPoint = middle
-    view.CameraPosition = [middle[0] + 1.2 * size[0], middle[1] - 3.0 * size[1], middle[2] + 1.1 * size[2]]
+    view.CameraPosition = [middle[0] - 3.0 * size[0], middle[1] - 1.2 * size[1], middle[2] + 1.1 * size[2]]
     view.CameraViewUp = [0.0, 0.0, 1.0]
     pv.Render(view)
     pv.ResetCamera(view)
@@ -87,8 +87,8 @@ def _show_grains(view: Any, grains: Any, cut: bool, middle: list[float], size: l
     balls.GlyphMode = "All Points"
     if cut:
         halves = pv.ClipClosedSurface(registrationName="cut grains", Input=balls)
-        halves.ClippingPlane.Origin = [middle[0], middle[1] - _BEHIND * size[1], middle[2]]
-        halves.ClippingPlane.Normal = [0.0, 1.0, 0.0]
+        halves.ClippingPlane.Origin = [middle[0] - _BEHIND * size[0], middle[1], middle[2]]
+        halves.ClippingPlane.Normal = [1.0, 0.0, 0.0]
         pv.Hide(balls, view)
         display = pv.Show(halves, view)
         display.ColorArrayName = ["POINTS", ""]
@@ -105,7 +105,7 @@ def _show_pores(view: Any, pores: Any, middle: list[float]) -> None:
     """The half behind the middle, coloured by pressure."""
     half = pv.Clip(registrationName="cut pores", Input=pores, ClipType="Plane")
     half.ClipType.Origin = middle
-    half.ClipType.Normal = [0.0, 1.0, 0.0]
+    half.ClipType.Normal = [1.0, 0.0, 0.0]
     half.Invert = 0
     display = pv.Show(half, view)
     if pores.CellData.GetArray("pressure") is not None:
@@ -133,11 +133,13 @@ def _show_throats(view: Any, throats: Any) -> None:
     tubes.Radius = 0.03 * throats.CellData["inscribed_radius"].GetRange()[1]
     tubes.RadiusFactor = 10.0
     display = pv.Show(tubes, view)
-    _colour(view, display, "CELLS", name, "Viridis (matplotlib)", "m3/s")
+    _colour(view, display, "CELLS", name, "Viridis (matplotlib)", "m3/s", "Upper Right Corner")
     pv.Hide(tubes, view)
 
 
-def _colour(view: Any, display: Any, place: str, name: str, colours: str, unit: str) -> None:
+def _colour(
+    view: Any, display: Any, place: str, name: str, colours: str, unit: str, corner: str = "Lower Right Corner"
+) -> None:
     pv.ColorBy(display, (place, name))
     display.RescaleTransferFunctionToDataRange(False, True)
     table = pv.GetColorTransferFunction(name)
@@ -145,6 +147,7 @@ def _colour(view: Any, display: Any, place: str, name: str, colours: str, unit: 
     table.NanColor = _GREY
     bar = pv.GetScalarBar(table, view)
     bar.Title, bar.ComponentTitle = f"{name} [{unit}]", ""
+    bar.WindowLocation = corner
     bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
     display.SetScalarBarVisibility(view, True)
 
