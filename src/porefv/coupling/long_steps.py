@@ -11,9 +11,9 @@ from __future__ import annotations
 from porefv.coupling.coupling_state import CouplingState
 
 # Error of the power of pairs, over that of the fluid on the grains, above which steps are halved, and below which it is
-# not noticeable. Rows of a run then balance to 1e-3 of the power of the weight.
-_MOST, _NOTICEABLE = 1e-3, 3e-4
-# Steps for which the change of a length is left to work, and those without a noticeable error until it may grow.
+# not noticeable.
+_MOST, _NOTICEABLE = 5e-4, 1.5e-4
+# Steps for which half the length is left to work, and those without a noticeable error until it may grow.
 _PATIENCE, _CALM = 10, 200
 
 
@@ -23,4 +23,4 @@ def adapt(state: CouplingState, error: float, most: int) -> None:
     if error > _MOST and state.calm >= _PATIENCE and state.longest > 1:
         state.longest, state.calm = state.longest // 2, 0
     elif state.calm >= _CALM and state.longest < most:
-        state.longest, state.calm = min(2 * state.longest, most), 0
+        state.longest, state.calm = min(2 * state.longest, most), _PATIENCE
