@@ -58,7 +58,7 @@ PACKINGS = (
 SIMULATION = """
 packing = {{ file = "{data}/packings/n25_s1.csv", scale = 0.05 }}
 fluid = {{ viscosity = {viscosity}, density = 1000.0 }}
-walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0 }}, lateral = {{ slip = true }} }}
+walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0, free = {pairs} }}, lateral = {{ slip = true }} }}
 output = {{ directory = "results/simulation", profiles = 1.0e-4 }}
 coupling = {{ scheme = "{scheme}", pair_resistance = {pairs}, stride = {stride} }}
 
@@ -73,6 +73,7 @@ rest = {{ unbalanced = 1.0e-2 }}
 name = "wet"
 plates = {{ z_max = {{ {plate} }} }}
 duration = 1.0e-3
+every = 5.0e-4
 permeameter = true
 """
 PRESSES = "stress = 10.0e3, top_speed = 0.5"
