@@ -2,6 +2,7 @@
 
     python benchmarks/coupling.py cost --store consolidation [--grains 5000]
     python benchmarks/coupling.py stability --store consolidation [--grains 500]
+    python benchmarks/coupling.py suspension [--grains 5000]
 
 `--store` holds samples as `benchmarks/consolidation.py` makes them. CPU time is of one thread, the least
 of several runs.
@@ -25,9 +26,15 @@ from consolidation import CONFINEMENT, DRAINED, VISCOSITY, sample
 
 import porefv.coupling.coupling as coupled_grains
 from porefv.coupling.coupling import Coupling
+from porefv.dem.dem import DEM
+from porefv.dem.material import Material
 from porefv.dem.plate import Plate
+from porefv.dem.random_placement import cloud
+from porefv.dem.sizes import UniformSizes
 from porefv.errors import ComputationError
 from porefv.flow.fluid import Fluid
+from porefv.flow.walls import Walls
+from porefv.packing.box import Box
 
 YADE = """
 import json, time
@@ -130,6 +137,45 @@ def cost(grains: int, store: Path) -> None:
         print(f"  Yade, {VISCOSITY:g} Pa s: speed of a grain after 205 steps {rival[1] if rival else None} m/s")
 
 
+def cloud_in_fluid(grains: int, stride: int | None):
+    """The cloud of the immersed deposition (C14 §4): 6 cm grains at a solid fraction of 0.25; dry without a stride."""
+    # Vessels as of C14's 5000 grains, 2 m high, and of 500.
+    sides = [1.5, 0.75, 2.0] if grains == 5000 else [0.45, 0.45, 1.117 * grains / 500]
+    packing = cloud(grains, UniformSizes(1.0), Box([0, 0, 0], sides), 0.75, 1)
+    dem = DEM(packing, Material(15e6, 0.5, 30.0, 2600.0), gravity=(0.0, 0.0, -9.81))
+    dem.apply(1000.0 * 9.81 * 4.0 / 3.0 * np.pi * packing.radii[:, None] ** 3 * [0.0, 0.0, 1.0])
+    if stride is None:
+        return dem
+    lid = Walls.from_mapping({"z_max": {"pressure": 0.0, "free": True}, "lateral": {"slip": True}})
+    fluid = Fluid(viscosity=100.0, density=1000.0)
+    return Coupling(dem, lid, fluid, pair_resistance=True, renewal=0.1, stride=stride)
+
+
+def suspension(grains: int) -> None:
+    """A step with pair resistance in a suspension, short and long, beside a dry one, for as long as a mesh lasts."""
+    dry, lasts = cloud_in_fluid(grains, None), 800
+    runs = {stride: cloud_in_fluid(grains, stride) for stride in (1, 10)}
+    dry.run(50)
+    for coupling in runs.values():
+        coupling.run(200)
+    dry_ms = least(dry.run, 200, 4)
+    print(f"{grains} grains: dry {dry_ms:.2f} ms")
+    for stride, coupling in runs.items():
+        before = coupling.effort.iterations, coupling.effort.pair_iterations
+        step_ms = least(coupling.run, 100, 4)
+        effort = coupling.effort
+        begin = time.process_time()
+        coupling.renew_mesh()
+        coupling.run(stride)
+        mesh_ms = 1e3 * (time.process_time() - begin) / lasts
+        print(
+            f"  stride {stride}: {step_ms:.2f} ms a step of the grains, {step_ms / dry_ms:.1f} dry ones; with a mesh "
+            f"every {lasts} steps {step_ms + mesh_ms:.2f} ms, {(step_ms + mesh_ms) / dry_ms:.1f}; iterations a long "
+            f"step: {stride * (effort.iterations - before[0]) / 400:.1f} for pressures, "
+            f"{stride * (effort.pair_iterations - before[1]) / 400:.1f} for pairs"
+        )
+
+
 def bounded(grains: int, store: Path, scheme: str, viscosity: float, part: float) -> bool:
     """Whether 200 steps of so much of the critical dry step stay within bounds."""
     dem = loaded(grains, store)
@@ -173,10 +219,13 @@ def stability(grains: int, store: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["cost", "stability"])
+    parser.add_argument("what", choices=["cost", "stability", "suspension"])
     parser.add_argument("--grains", type=int)
     parser.add_argument("--store", type=Path, default=Path("consolidation"), help="directory of samples")
     options = parser.parse_args()
+    if options.what == "suspension":
+        suspension(options.grains or 5000)
+        return
     options.store.mkdir(exist_ok=True)
     if options.what == "cost":
         cost(options.grains or 5000, options.store)

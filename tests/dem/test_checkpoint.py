@@ -241,7 +241,7 @@ def test_a_newer_format_says_so(rewritten, saved):
         content.clear()
 
     rewritten(path, newer)
-    with pytest.raises(InputError, match=r"state\.npz has format 5, written by porefv 9\.9.*Install the newer porefv"):
+    with pytest.raises(InputError, match=r"state\.npz has format 6, written by porefv 9\.9.*Install the newer porefv"):
         checkpoint.load(path)
 
 
@@ -379,7 +379,7 @@ def test_steps_must_be_whole_numbers(tmp_path, steps, every, name):
 # ---- older files ----------
 
 
-@pytest.mark.parametrize("version", [1, 2, 3])
+@pytest.mark.parametrize("version", [1, 2, 3, 4])
 def test_a_file_of_an_older_version_is_loaded(version):
     # Written after 100 steps by the versions of porefv, 0.1.0 and 0.2.0, that had those formats; 3 by two threads.
     again, dem = checkpoint.load(FILES / f"version_{version}.npz"), assembly("sc8")

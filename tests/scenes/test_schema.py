@@ -168,7 +168,7 @@ def test_defaults_are_those_of_the_functions():
     )
     coupling = KINDS["simulation"].from_mapping(BASES["simulation"], DATA / "scenes").coupling
     found = defaults(Coupling)
-    assert len(coupling.parameters) == 7
+    assert len(coupling.parameters) == 8
     assert coupling.parameters == {name: found[name] for name in coupling.parameters}
     rest = KINDS["simulation"].from_mapping(BASES["simulation"], DATA / "scenes").stages[0].end
     found = defaults(DEM.run_to_rest)

@@ -58,9 +58,9 @@ PACKINGS = (
 SIMULATION = """
 packing = {{ file = "{data}/packings/n25_s1.csv", scale = 0.05 }}
 fluid = {{ viscosity = {viscosity}, density = 1000.0 }}
-walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0 }}, lateral = {{ slip = true }} }}
+walls = {{ z_min = {{ pressure = 0.0 }}, z_max = {{ pressure = 0.0, free = {pairs} }}, lateral = {{ slip = true }} }}
 output = {{ directory = "results/simulation", profiles = 1.0e-4 }}
-coupling = {{ scheme = "{scheme}", pair_resistance = {pairs} }}
+coupling = {{ scheme = "{scheme}", pair_resistance = {pairs}, stride = {stride} }}
 
 [[stages]]
 name = "dry"
@@ -71,14 +71,17 @@ rest = {{ unbalanced = 1.0e-2 }}
 
 [[stages]]
 name = "wet"
-plates = {{ z_max = {{ stress = 10.0e3, top_speed = 0.5 }} }}
+plates = {{ z_max = {{ {plate} }} }}
 duration = 1.0e-3
+every = 5.0e-4
 permeameter = true
 """
+PRESSES = "stress = 10.0e3, top_speed = 0.5"
 SIMULATIONS = [
-    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "false"},
-    {"scheme": "semi-implicit", "viscosity": 1.0e-3, "pairs": "false"},
-    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "true"},
+    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "false", "stride": 1, "plate": PRESSES},
+    {"scheme": "semi-implicit", "viscosity": 1.0e-3, "pairs": "false", "stride": 1, "plate": PRESSES},
+    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "true", "stride": 1, "plate": PRESSES},
+    {"scheme": "implicit-drag", "viscosity": 10.0, "pairs": "true", "stride": 4, "plate": "velocity = [0.0, 0.0, 0.0]"},
 ]
 
 

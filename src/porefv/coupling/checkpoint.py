@@ -27,7 +27,7 @@ from porefv.flow.fluid import Fluid
 from porefv.flow.walls import Walls
 from porefv.packing.box import WALLS
 
-FORMAT, VERSION = "porefv.coupling", 3
+FORMAT, VERSION = "porefv.coupling", 4
 
 
 def save(coupling: Coupling, path: str | PathLike[str]) -> None:
@@ -88,6 +88,8 @@ def load(path: str | PathLike[str], conductance: ConductanceModel | None = None)
                 "pair_places": np.zeros(0),
                 "pair_velocities": np.zeros((0, 6)),
             }
+        if header["version"] < 4:  # without long steps
+            header["numbers"] = header["numbers"] | {"stride": 1, "longest": 1, "calm": 0}
         grains = {name.removeprefix(prefix): array for name, array in content.items() if name.startswith(prefix)}
         described = {"name": str(header["conductance"]["name"])} | header["conductance"]
         saved = _of_package(described)

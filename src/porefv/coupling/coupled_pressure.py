@@ -113,6 +113,7 @@ class CoupledPressure:
     ):
         self.layers = np.full(mesh.n_pores, -1) if layers is None else layers
         self.mesh, self.exchange, self.conductances, self.mobilities = mesh, exchange, conductances, mobilities
+        self._of_factor = mobilities
         self.free = np.isnan(self._of_walls(pressures))
         if not self.free.any():
             raise InputError(
@@ -150,6 +151,14 @@ class CoupledPressure:
         self._links = Links(starts, columns, self.network.links, self.network.leaks)
         self._held_forces = np.zeros((mesh.n_spheres + 6, 3))
         self._of_held.spread(self._held, self._held_forces)
+
+    def set_mobilities(self, mobilities: np.ndarray) -> None:
+        """Change what a force over the step adds to the velocities of grains (n,), as the length of the step does.
+
+        The preconditioner stays that of the mobilities before.
+        """
+        if not np.array_equal(mobilities, self.mobilities):
+            self.mobilities, self._common = mobilities, None
 
     # ---- solving ------------------------------------------------------------------------------------------------
 
@@ -225,7 +234,7 @@ class CoupledPressure:
         mesh = self.mesh
         drags = np.zeros(mesh.n_spheres + 6)
         rows = self.exchange.rows[: mesh.n_cells]  # of the cells themselves; the others are for their neighbours
-        drags[mesh.cells.ravel()] = np.append(self.mobilities, np.zeros(6))[rows.ravel()]
+        drags[mesh.cells.ravel()] = np.append(self._of_factor, np.zeros(6))[rows.ravel()]
         vertices = mesh.facets.vertices[mesh.throats.first_facets]
         drag = drags[vertices].sum(axis=1) * (mesh.throats.areas / 3.0) ** 2
         nothing = np.zeros(mesh.n_pores)
@@ -252,7 +261,7 @@ class CoupledPressure:
         rows = np.repeat(free.nodes.astype(np.int64), 12)
         shape = len(self.network), 3 * (n + 6)
         operator = sparse.csr_array((free.gradients.ravel(), (rows, columns)), shape=shape)
-        mobilities = np.repeat(np.append(self.mobilities, np.zeros(6)), 3)
+        mobilities = np.repeat(np.append(self._of_factor, np.zeros(6)), 3)
         drag = operator @ sparse.diags_array(mobilities) @ operator.T
         return (drag + sparse.diags_array(leaks) + self.network.to_matrix()).tocsr()
 

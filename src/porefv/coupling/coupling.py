@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -16,13 +17,14 @@ from porefv.coupling.coupling_state import CouplingState
 from porefv.coupling.end_correction import end_corrected_conductances
 from porefv.coupling.exchange import Exchange
 from porefv.coupling.free_surface import clear_layers
+from porefv.coupling.long_steps import adapt
 from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
 from porefv.coupling.pair_motion import PairMotion
 from porefv.coupling.pair_resistance import PairResistance
 from porefv.coupling.power import Power
 from porefv.coupling.relative_motion import RelativeMotion
 from porefv.coupling.validity import Validity, validity
-from porefv.dem.grain_model import GrainModel, SpinningGrainModel
+from porefv.dem.grain_model import GrainModel, LongStepGrainModel, SpinningGrainModel
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pressure import held_pressures
@@ -42,10 +44,13 @@ _ANEW = 1e-8
 _ANEW_EVERY = 50
 # Tolerance of pairs over that of pressures: with 1 it rules the error of the power, and 0.1 costs a tenth of a step.
 _OF_PAIRS = 0.1
+# The same in long steps, in which their splitting from pressures rules it.
+_OF_PAIRS_IN_LONG_STEPS = 0.3
 # Most rounds of pairs and pressures in the first step on a mesh, and the relative change at which they end.
 _ROUNDS, _SETTLED = 30, 1e-3
 # Steps between two looks at how far grains have moved.
 _STRIDE = 10
+# (`cast`: to ask each step whether grains are of a protocol takes longer than the step of a few hundred.)
 # The rows of the walls in arrays of grains and walls.
 _WALL_ROWS = np.arange(-6, 0)
 
@@ -83,6 +88,10 @@ class Coupling:
         dissipation, and each step costs more.
     roughness : float
         Gap, over the mean radius of a pair, below which lubrication grows no more.
+    stride : int
+        Length of a step of grains and fluid together, in steps of the grains. In one longer than a step contacts yield
+        (`porefv.dem.yielding_contacts`): they are implicit like the resistance of pairs. Where a wall presses with a
+        stress, steps are not long.
 
     Attributes
     ----------
@@ -131,11 +140,12 @@ class Coupling:
         end_correction: bool = True,
         pair_resistance: bool = False,
         roughness: float = 0.02,
+        stride: int = 1,
     ):
         self._set_up(
             grains, walls, fluid if fluid is not None else Fluid(),
             ensure_model(conductance) if conductance is not None else AUTO(),
-            CouplingSettings(scheme, exchange, tolerance, renewal, end_correction, pair_resistance, roughness),
+            CouplingSettings(scheme, exchange, tolerance, renewal, end_correction, pair_resistance, roughness, stride),
         )  # fmt: skip
         self._make_mesh(Packing(grains.positions, grains.radii, grains.box))
 
@@ -191,6 +201,11 @@ class Coupling:
                 "pair_resistance needs grains that spin: a grain model with `spins` and `predict_spins`, and with "
                 "torques in `correct` (porefv.dem.SpinningGrainModel)"
             )
+        if settings.stride > 1 and not isinstance(grains, LongStepGrainModel):
+            raise InputError(
+                "stride needs grains whose contacts yield within a step (porefv.dem.LongStepGrainModel), as those of "
+                "porefv.dem.DEM; with other grains it is 1"
+            )
         self.effort = Effort()
 
     # ---- time ---------------------------------------------------------------------------------------------------
@@ -203,24 +218,41 @@ class Coupling:
         ComputationError
             If the motion runs away, or pressures cannot be found.
         """
-        for _ in range(steps):
-            if self.effort.steps % _STRIDE == 0 and self._relative_motion(self.grains) > self.settings.renewal:
+        while steps > 0:
+            stride = min(self.stride, steps)
+            look = self.effort.steps % _STRIDE < stride
+            if look and self._relative_motion(self.grains) > self.settings.renewal:
                 self.renew_mesh()
-            self._step()
+            self._step(stride, look)
+            steps -= stride
 
-    def _step(self) -> None:
+    @property
+    def stride(self) -> int:
+        """Length of a step now, in steps of the grains."""
+        if self.settings.stride == 1:
+            return 1
+        return 1 if cast(LongStepGrainModel, self.grains).presses else self.state.longest
+
+    def _step(self, stride: int, look: bool) -> None:
         pairs = self._pairs
         with Timer(self.effort.seconds, "grains"):
-            predicted, wall_speeds, mobilities, wall_mobilities = self.grains.predict()
+            if stride == 1:
+                predicted, wall_speeds, mobilities, wall_mobilities = self.grains.predict()
+            else:
+                long = cast(LongStepGrainModel, self.grains)
+                predicted, wall_speeds, mobilities, wall_mobilities = long.predict(stride)
+            if self.settings.stride > 1:
+                self.equation.set_mobilities(mobilities)
+                self._change_stride(stride)
             self._refuse_no_way_out(wall_speeds, wall_mobilities)
             moves = self._moves
             moves[:-6], moves[-6:] = predicted, self.grains.wall_velocities
             moves[_WALL_ROWS, WALL_AXES] = WALL_SENSES * wall_speeds
         if pairs is not None:
             with Timer(self.effort.seconds, "pairs"):
-                if self.effort.steps % _STRIDE == 0:
+                if look:
                     pairs.look(self.grains, self.state)
-                pairs.begin(self.grains, moves, mobilities, wall_mobilities)
+                pairs.begin(self.grains, moves, mobilities, wall_mobilities, stride)
         if self.scheme == "implicit-drag":
             self._find_implicit_pressure(moves, wall_mobilities)
         else:
@@ -231,15 +263,26 @@ class Coupling:
         with Timer(self.effort.seconds, "forces"):
             forces = self.equation.forces(self.state.pressure)
             if pairs is not None:
+                if self.settings.stride > 1:
+                    adapt(self.state, pairs.mismatch(forces, self.state), self.settings.stride)
                 forces += pairs.forces[:, :3]
             thrusts = forces[_WALL_ROWS, WALL_AXES] * WALL_SENSES
         with Timer(self.effort.seconds, "grains"):
             if pairs is None:
                 self.grains.correct(forces[:-6], thrusts)
+            elif stride == 1:
+                cast(SpinningGrainModel, self.grains).correct(forces[:-6], thrusts, pairs.forces[:-6, 3:])
             else:
-                assert isinstance(self.grains, SpinningGrainModel)
-                self.grains.correct(forces[:-6], thrusts, pairs.forces[:-6, 3:])
-        self.effort.steps += 1
+                long = cast(LongStepGrainModel, self.grains)
+                long.correct(forces[:-6], thrusts, pairs.forces[:-6, 3:], pairs.yielded)
+        self.effort.steps += stride
+
+    def _change_stride(self, stride: int) -> None:
+        """Take in the length of a step: another matrix, and what the last step changed in proportion to it."""
+        state = self.state
+        if stride != state.stride:
+            state.rate = state.rate * (stride / state.stride)
+            state.products, state.stride = np.zeros((2, 0)), stride
 
     def _find_implicit_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> None:
         """Find the pressures of a step that is implicit in the drag, and the resistance of pairs before it.
@@ -264,10 +307,13 @@ class Coupling:
         """What pairs resist with, under the pressures there are."""
         if self._pairs is not None:
             with Timer(self.effort.seconds, "pairs"):
-                forces = self.equation.forces(self.state.pressure)
-                self.effort.pair_iterations += self._pairs.resist(
-                    forces, _OF_PAIRS * self.settings.tolerance, self.state
-                )
+                state, part = self.state, _OF_PAIRS
+                pressure = state.pressure
+                if state.stride > 1:
+                    # Half of what the last step changed: without, long steps ring; all of it is unstable.
+                    pressure, part = pressure + 0.5 * state.rate, _OF_PAIRS_IN_LONG_STEPS
+                forces = self.equation.forces(pressure)
+                self.effort.pair_iterations += self._pairs.resist(forces, part * self.settings.tolerance, state)
 
     def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> None:
         """Find the pressures of a step, and what the next one starts from."""
@@ -275,7 +321,7 @@ class Coupling:
         # Half of what the last step changed: all of it would pass its noise on.
         guess, product = state.pressure + 0.5 * state.rate, None
         steady = equation.is_steady(wall_mobilities)
-        if steady and state.products.size and self.effort.steps % _ANEW_EVERY:
+        if steady and state.products.size and self.effort.steps % (_ANEW_EVERY * state.stride) >= state.stride:
             product = state.products[0] + 0.5 * state.products[1]
         if state.fresh:
             tolerance = min(tolerance, _ANEW)
@@ -323,11 +369,12 @@ class Coupling:
 
     def renew_mesh(self) -> None:
         """Make the mesh anew, with the pressures there were."""
-        around, pair_velocities = _mean_by_vertex(self.mesh, self.cell_pressure), self.state.pair_velocities
+        around, before = _mean_by_vertex(self.mesh, self.cell_pressure), self.state
         self._make_mesh(Packing(self.grains.positions, self.grains.radii, self.grains.box))
         cells = around[self.mesh.cells].mean(axis=1)
         pores = np.bincount(self.mesh.cell_pore, cells, self.mesh.n_pores) / np.bincount(self.mesh.cell_pore)
-        self.state.pressure, self.state.pair_velocities = pores[self.equation.free], pair_velocities
+        self.state.pressure, self.state.pair_velocities = pores[self.equation.free], before.pair_velocities
+        self.state.longest, self.state.calm = before.longest, before.calm
 
     def _make_mesh(self, packing: Packing) -> None:
         """Make the mesh of a packing, its conductances and its exchange with the grains; pressures are zero."""
@@ -354,12 +401,13 @@ class Coupling:
                 split=self.conductance.force_split, solid_pressure=weights, wall_reach=reach,
             )  # fmt: skip
             drag = np.empty(len(packing))
-            drag[grains.rows] = grains.step / grains.masses
+            drag[grains.rows] = self.settings.stride * grains.step / grains.masses
             self.equation, scheme, drag_number = self._choose(
                 lambda mobilities: CoupledPressure(mesh, exchange, conductances, pressures, mobilities, layers), drag
             )
             self.mesh = mesh
             self.state = CouplingState.of(packing, int(np.count_nonzero(self.equation.free)), scheme, drag_number)
+            self.state.stride = self.state.longest = self.settings.stride
             self._relative_motion = RelativeMotion(mesh)
             self._closed = bool(np.isnan(pressures).all())
             self._moves = np.zeros((len(packing) + 6, 3))
@@ -469,9 +517,9 @@ class Coupling:
         power = self.equation.power(self.state.pressure, velocities)
         if self._pairs is None:
             return power
-        assert isinstance(self.grains, SpinningGrainModel)
-        spins = np.empty_like(self.grains.spins)
-        spins[self.grains.rows] = self.grains.spins
+        turning = cast(SpinningGrainModel, self.grains).spins
+        spins = np.empty_like(turning)
+        spins[self.grains.rows] = turning
         grains, walls, pairs = self._pairs.power(velocities, spins, self.state)
         return replace(power, grains=power.grains + grains, walls=power.walls + walls, pairs=pairs)
 

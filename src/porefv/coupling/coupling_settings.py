@@ -9,6 +9,8 @@ from porefv.errors import InputError
 from porefv.system.number_checks import is_finite_number
 
 SCHEMES = ("auto", "implicit-drag", "semi-implicit")
+# Longest step of grains and fluid together, in steps of the grains.
+MOST_STRIDE = 20
 # What seconds are counted for.
 PARTS = ("mesh", "grains", "pressure", "pairs", "forces")
 
@@ -24,6 +26,7 @@ class CouplingSettings:
     end_correction: bool = True
     pair_resistance: bool = False
     roughness: float = 0.02
+    stride: int = 1
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -34,6 +37,13 @@ class CouplingSettings:
             raise InputError(f"tolerance must lie between 0 and 1, not {self.tolerance!r}")
         if not 0.0 < self.renewal <= 1.0:
             raise InputError(f"renewal must be a part of the mean radius, in (0, 1], not {self.renewal!r}")
+        if type(self.stride) is not int or not 1 <= self.stride <= MOST_STRIDE:
+            raise InputError(f"stride must be a whole number of steps, 1 to {MOST_STRIDE}, not {self.stride!r}")
+        if self.stride > 1 and not (self.pair_resistance and self.scheme != "semi-implicit"):
+            raise InputError(
+                f"a stride of {self.stride} steps is for pair_resistance = true, whose lubrication keeps contacts from "
+                "bouncing, and for an implicit step: scheme = 'auto' or 'implicit-drag'"
+            )
         if not 1e-6 <= self.roughness <= 0.2:
             raise InputError(f"roughness must be a part of the radius, in [1e-6, 0.2], not {self.roughness!r}")
 

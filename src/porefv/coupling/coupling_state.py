@@ -42,6 +42,12 @@ class CouplingState:
         Of grains, by id, and walls, when the resistance of pairs was last worked out [m]; none without it.
     pair_velocities : (v, 6) array
         Velocities and spins of grains, by row, and walls that pairs resisted over the last step [m/s, rad/s].
+    stride : int
+        Length of the last step, in steps of the grains.
+    longest : int
+        Length that a step may have now, see `porefv.coupling.long_steps`.
+    calm : int
+        Steps since it was changed last, or since the error of one was noticeable.
     """
 
     mesh_centres: Annotated[np.ndarray, ArrayOf("f8", ("n", 3))]
@@ -57,6 +63,9 @@ class CouplingState:
     pair_centres: Annotated[np.ndarray, ArrayOf("f8", ("k", 3))]
     pair_places: Annotated[np.ndarray, ArrayOf("f8", ("q",))]
     pair_velocities: Annotated[np.ndarray, ArrayOf("f8", ("v", 6))]
+    stride: int
+    longest: int
+    calm: int
 
     def __post_init__(self) -> None:
         for name, found, most in (
@@ -67,6 +76,8 @@ class CouplingState:
                 raise ValueError(f"{name} is of {found}, not of 0 or {most}")
         if self.scheme not in ("implicit-drag", "semi-implicit"):
             raise ValueError(f"there is no scheme {self.scheme!r}")
+        if not (self.stride >= 1 and self.longest >= 1 and self.calm >= 0):
+            raise ValueError("stride, longest or calm is out of range")
         for name in (
             "mesh_centres", "mesh_radii", "mesh_box", "pressure", "rate", "products", "factor_mobilities",
             "pair_centres", "pair_places", "pair_velocities",
@@ -92,7 +103,7 @@ class CouplingState:
         pressure, rate = np.zeros((2, free))
         return cls(
             packing.centres, packing.radii, corners, scheme, drag_number, pressure, rate, np.zeros((2, 0)), True,
-            np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 6)),
+            np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 6)), 1, 1, 0,
         )  # fmt: skip
 
     @property

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from porefv.coupling.coupling_state import CouplingState
-from porefv.coupling.pair_resistance import PairLaw, PairResistance
-from porefv.dem.grain_model import GrainModel, SpinningGrainModel
+from porefv.coupling.pair_resistance import PairLaw, PairResistance, Pairs
+from porefv.dem.grain_model import GrainModel, LongStepGrainModel, SpinningGrainModel
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
 
@@ -34,11 +36,14 @@ class PairMotion:
     resistance : PairResistance
     forces : (n + 6, 6) array
         Forces and torques of the pairs on grains and walls, by row, over the last step [N, N m].
+    yielded : (n + 6, 6) array
+        The same of contacts that have yielded in it; zero in a step that is not a long one.
     """
 
     def __init__(self, mesh: PoreMesh, dragging: np.ndarray, viscosity: float, roughness: float, rows: np.ndarray):
         self.resistance = PairResistance(mesh, dragging, PairLaw(viscosity, roughness), rows)
-        self._free, self._mobilities, self.forces = np.zeros((3, mesh.n_spheres + 6, 6))
+        self._free, self._mobilities, self.forces, self.yielded = np.zeros((4, mesh.n_spheres + 6, 6))
+        self._contacts: Pairs | None = None
 
     def look(self, grains: GrainModel, state: CouplingState) -> None:
         """Work out the coefficients for grains and walls where they are, and note these places."""
@@ -50,28 +55,48 @@ class PairMotion:
         self.resistance.set_positions(state.pair_centres, state.mesh_radii, state.pair_places)
         self.forces = -self.resistance.multiply(state.pair_velocities)
 
-    def begin(self, grains: GrainModel, moves: np.ndarray, mobilities: np.ndarray, wall_mobilities: np.ndarray) -> None:
+    def begin(
+        self,
+        grains: GrainModel,
+        moves: np.ndarray,
+        mobilities: np.ndarray,
+        wall_mobilities: np.ndarray,
+        stride: int,
+    ) -> None:
         """Take in what grains and walls would do in a step without the fluid: see `GrainModel.predict`."""
-        assert isinstance(grains, SpinningGrainModel)
-        spins, turning = grains.predict_spins()
+        spins, turning = cast(SpinningGrainModel, grains).predict_spins()
         self._free[:, :3], self._free[:-6, 3:] = moves, spins
         self._mobilities[:-6, :3], self._mobilities[:-6, 3:] = mobilities[:, None], turning[:, None]
         self._mobilities[_WALL_ROWS, WALL_AXES] = wall_mobilities
+        self._contacts = None
+        if stride > 1:
+            self._contacts = Pairs(*cast(LongStepGrainModel, grains).yielding_contacts)
 
     def resist(self, forces: np.ndarray, tolerance: float, state: CouplingState) -> int:
         """Find the forces of pairs where the fluid presses with forces (n + 6, 3); returns the number of iterations."""
         without = self._free.copy()
         without[:, :3] += self._mobilities[:, :3] * forces
         guess = state.pair_velocities - without
-        state.pair_velocities, self.forces, iterations = self.resistance.solve(
-            without, self._mobilities, guess, tolerance
+        state.pair_velocities, self.forces, self.yielded, iterations = self.resistance.solve(
+            without, self._mobilities, guess, tolerance, self._contacts
         )
         return iterations
 
+    def mismatch(self, forces: np.ndarray, state: CouplingState) -> float:
+        """Error of the power of pairs, over that of the fluid on grains and walls.
+
+        Pairs resist velocities that are not quite those of the step, where the fluid presses with forces (n + 6, 3).
+        """
+        own = self.forces[:, :3]
+        velocities = self._free[:, :3] + self._mobilities[:, :3] * (forces + own + self.yielded[:, :3])
+        whole = abs(float(np.vdot(forces + own, velocities)))
+        wrong = abs(float(np.vdot(own, velocities - state.pair_velocities[:, :3])))
+        return wrong / whole if whole > 0.0 else 0.0
+
     @property
     def changes(self) -> np.ndarray:
-        """(n + 6, 6): what pairs add to velocities and spins of the step [m/s, rad/s]."""
-        return self._mobilities * self.forces
+        """(n + 6, 6): what pairs, and contacts that yield, add to velocities and spins of the step [m/s, rad/s]."""
+        return self._mobilities * (self.forces + self.yielded)
 
     def power(self, velocities: np.ndarray, spins: np.ndarray, state: CouplingState) -> tuple[float, float, float]:
         """Work of the pairs on grains and on walls, and what they dissipate, a second [W].

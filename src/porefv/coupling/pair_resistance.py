@@ -92,6 +92,9 @@ class Pairs(NamedTuple):
     rolling: np.ndarray
 
 
+_NO_CONTACTS = Pairs(np.empty((0, 2), np.uint32), np.empty((0, 3)), np.empty((0, 2)), *np.empty((3, 0)))
+
+
 class PairResistance:
     """L of the pairs of one mesh: forces and torques -L u for velocities and spins u.
 
@@ -126,6 +129,7 @@ class PairResistance:
         members = np.stack(np.divmod(codes, n + 6), axis=1).astype(np.uint32)
         count = len(members)
         self.pairs = Pairs(members, np.empty((count, 3)), np.empty((count, 2)), *np.empty((3, count)))
+        self._blocks, self._room = np.zeros((n + 6, 2, 6)), np.empty((4, n + 6, 6))
         self.set_positions(mesh.packing.centres, mesh.packing.radii, mesh.box.wall_places)
 
     def set_positions(self, centres: np.ndarray, radii: np.ndarray, places: np.ndarray) -> None:
@@ -133,8 +137,8 @@ class PairResistance:
         motion = np.empty((len(centres), 4))
         motion[self._rows, :3], motion[self._rows, 3] = centres, radii
         find_coefficients(self.law, self.pairs.members, motion, places, self.pairs)
-        self._blocks = np.zeros((2, len(motion) + 6, 3, 3))
-        add_blocks(self.pairs, self._blocks[0], self._blocks[1])
+        self._blocks[:] = 0.0
+        add_blocks(self.pairs, self._blocks)
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
 
     def multiply(self, velocities: np.ndarray) -> np.ndarray:
@@ -144,8 +148,13 @@ class PairResistance:
         return resisted
 
     def solve(
-        self, velocities: np.ndarray, mobilities: np.ndarray, guess: np.ndarray, tolerance: float
-    ) -> tuple[np.ndarray, np.ndarray, int]:
+        self,
+        velocities: np.ndarray,
+        mobilities: np.ndarray,
+        guess: np.ndarray,
+        tolerance: float,
+        contacts: Pairs | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
         """u with u = ẋ* - D L u: velocities after a step in which pairs resist those at its end.
 
         Parameters
@@ -158,12 +167,14 @@ class PairResistance:
             Where to start: u - ẋ*.
         tolerance : float
             Bound on what the residual changes velocities by over the step, relative to them.
+        contacts : Pairs, optional
+            Contacts that yield in the step, by the same law: they resist besides.
 
         Returns
         -------
         u : (n + 6, 6) array
-        forces : (n + 6, 6) array
-            -L u, forces and torques of the pairs [N, N m].
+        forces, yielded : (n + 6, 6) arrays
+            Forces and torques of the pairs, and of such contacts [N, N m].
         iterations : int
 
         Raises
@@ -171,25 +182,29 @@ class PairResistance:
         ComputationError
             If it is not reached.
         """
+        contacts = _NO_CONTACTS if contacts is None else contacts
         inertia = np.divide(1.0, mobilities, out=np.zeros_like(mobilities), where=mobilities > 0.0)
-        changes, forces, room = guess.copy(), np.empty_like(guess), np.empty((4, *guess.shape))
+        changes, room = guess.copy(), self._room
+        forces, yielded = np.empty((2, *guess.shape))
         iterations = solve_for_changes(
-            self.pairs, inertia, self._inverses(inertia), velocities, changes, forces, room, float(tolerance),
-            _MOST_ITERATIONS,
+            self.pairs, contacts, mobilities, inertia, self._inverses(inertia, contacts), velocities, changes, forces,
+            yielded, room, float(tolerance), _MOST_ITERATIONS,
         )  # fmt: skip
         if iterations < 0:
             raise ComputationError(
                 f"the velocities of grains that lubrication slows down were not found in {_MOST_ITERATIONS} "
                 "iterations; a larger roughness, a smaller step or a lower viscosity makes it easier"
             )
-        return velocities + changes, forces, iterations
+        return velocities + changes, forces, yielded, iterations
 
-    def _inverses(self, inertia: np.ndarray) -> np.ndarray:
-        """(2, n + 6, 3, 3): inverses of the diagonal blocks of D⁻¹ + L, zero in what moves on its own."""
-        if self._kept is None or not np.array_equal(self._kept[0][:-6], inertia[:-6]):
-            first, inverses = 0, np.empty_like(self._blocks)
-        else:
+    def _inverses(self, inertia: np.ndarray, contacts: Pairs) -> np.ndarray:
+        """(n + 6, 2, 6): inverses of the diagonal blocks of D⁻¹ + L, zero in what moves on its own."""
+        first, blocks, inverses = 0, self._blocks, np.empty_like(self._blocks)
+        if len(contacts.normal):
+            blocks = blocks.copy()
+            add_blocks(contacts, blocks)
+        elif self._kept is not None and np.array_equal(self._kept[0][:-6], inertia[:-6]):
             first, inverses = len(inertia) - 6, self._kept[1]
-        invert_blocks(first, inertia, self._blocks, inverses)
-        self._kept = inertia, inverses
+        invert_blocks(first, inertia, blocks, inverses)
+        self._kept = None if len(contacts.normal) else (inertia, inverses)
         return inverses

@@ -9,24 +9,19 @@ from porefv.system.kernels import helper, kernel
 
 
 @helper(error_model="numpy")
-def _normal(r, s, gap, reach):
-    """Coefficient of the normal lubrication of two spheres (Jeffrey and Onishi 1984, X^A), over π μ [m].
+def _lubrication(r, s, gap, reach, logarithm):
+    """Coefficients of normal and tangential lubrication of two spheres without spins, over π μ [m].
 
-    `r` is the smaller radius, `s` the other over it, infinite for a plane; `gap` is 2 h / (r + r s), or h / r, and
-    below `reach`, where the coefficient ends.
+    They are the leading terms of Jeffrey and Onishi (1984), X^A and Y^A. `r` is the smaller radius, `s` the other over
+    it, infinite for a plane; `gap` is 2 h / (r + r s), or h / r, and below `reach`, where the coefficients end;
+    `logarithm` is that of reach / gap.
     """
-    inverse, logarithm = 1.0 / gap - 1.0 / reach, np.log(reach / gap)
+    inverse = 1.0 / gap - 1.0 / reach
     if np.isinf(s):
-        return 6.0 * r * (inverse + 0.2 * logarithm)
-    cube = (1.0 + s) ** 3
-    return 6.0 * r * (2.0 * s**2 / cube * inverse + s * (1.0 + 7.0 * s + s**2) / (5.0 * cube) * logarithm)
-
-
-@helper(error_model="numpy")
-def _tangential(r, s, gap, reach):
-    """The same of the tangential lubrication (Y^A), without spins."""
-    share = 8.0 / 15.0 if np.isinf(s) else 4.0 * s * (2.0 + s + 2.0 * s**2) / (15.0 * (1.0 + s) ** 3)
-    return 6.0 * r * share * np.log(reach / gap)
+        return 6.0 * r * (inverse + 0.2 * logarithm), 3.2 * r * logarithm
+    cube = (1.0 + s) * (1.0 + s) * (1.0 + s)
+    normal = 2.0 * s * s * inverse + 0.2 * s * (1.0 + 7.0 * s + s * s) * logarithm
+    return 6.0 * r * normal / cube, 1.6 * r * s * (2.0 + s + 2.0 * s * s) * logarithm / cube
 
 
 @kernel(error_model="numpy")
@@ -63,10 +58,11 @@ def find_coefficients(law, members, motion, places, pairs):
             gap = distance - r - other
             half = 0.5 * (r + other)
             pairs.arms[c, 0], pairs.arms[c, 1] = r + 0.5 * gap, other + 0.5 * gap
-            rolling = 0.6 * size**3
+            rolling = 0.6 * size * size * size
             wide = max(gap, 0.0) / half
-            fading = 1.0 + (distance / half / law.reach) ** 4
-            far = size * law.growth * min(wide, law.grown) / fading
+            far_off = distance / (half * law.reach)
+            far_off *= far_off
+            far = size * law.growth * min(wide, law.grown) / (1.0 + far_off * far_off)
         else:
             w = j - n
             axis = WALL_AXES[w]
@@ -81,9 +77,11 @@ def find_coefficients(law, members, motion, places, pairs):
         normal, tangential, turning = far, far, 0.0
         if narrow < law.lubricated:
             constant = size * law.contact * (1.0 - narrow / law.lubricated)
-            normal += _normal(small, ratio, narrow, law.lubricated) + constant
-            tangential += _tangential(small, ratio, narrow, law.lubricated) + constant
-            turning = rolling * np.log(law.lubricated / narrow)
+            logarithm = np.log(law.lubricated / narrow)
+            near = _lubrication(small, ratio, narrow, law.lubricated, logarithm)
+            normal += near[0] + constant
+            tangential += near[1] + constant
+            turning = rolling * logarithm
         pairs.normal[c] = np.pi * law.viscosity * normal
         pairs.tangential[c] = np.pi * law.viscosity * tangential
         pairs.rolling[c] = np.pi * law.viscosity * turning
@@ -157,21 +155,30 @@ def add_resistance(pairs, u, lu):
 
 
 @kernel
-def add_blocks(pairs, moving, turning):
-    """Add the diagonal blocks of L: `moving` and `turning`, both (m, 3, 3), of velocities and of spins."""
+def add_blocks(pairs, blocks):
+    """Add the diagonal blocks of L, (m, 2, 6): of velocities and of spins, as xx, yy, zz, yz, zx, xy."""
     members, normals, arms, normal, tangential, rolling = pairs
     for c in range(members.shape[0]):
+        x, y, z = normals[c, 0], normals[c, 1], normals[c, 2]
+        xx, yy, zz, yz, zx, xy = x * x, y * y, z * z, y * z, z * x, x * y
+        across = tangential[c]
+        along = normal[c] - across
         for side in range(2):
-            k = members[c, side]
+            block = blocks[members[c, side]]
             arm = arms[c, side]
-            across = arm * arm * tangential[c] + (rolling[c] if arm > 0.0 else 0.0)
-            for a in range(3):
-                moving[k, a, a] += tangential[c]
-                turning[k, a, a] += across
-                for b in range(3):
-                    both = normals[c, a] * normals[c, b]
-                    moving[k, a, b] += (normal[c] - tangential[c]) * both
-                    turning[k, a, b] -= across * both
+            turning = arm * arm * across + (rolling[c] if arm > 0.0 else 0.0)
+            block[0, 0] += across + along * xx
+            block[0, 1] += across + along * yy
+            block[0, 2] += across + along * zz
+            block[0, 3] += along * yz
+            block[0, 4] += along * zx
+            block[0, 5] += along * xy
+            block[1, 0] += turning * (1.0 - xx)
+            block[1, 1] += turning * (1.0 - yy)
+            block[1, 2] += turning * (1.0 - zz)
+            block[1, 3] -= turning * yz
+            block[1, 4] -= turning * zx
+            block[1, 5] -= turning * xy
 
 
 @kernel(error_model="numpy")
@@ -183,50 +190,48 @@ def invert_blocks(first, inertia, blocks, inverses):
     first : int
     inertia : (m, 6) array
         D⁻¹; zero for what moves on its own.
-    blocks, inverses : (2, m, 3, 3) arrays
-        Of L, of velocities and of spins; and the inverses.
+    blocks, inverses : (m, 2, 6) arrays
+        Of L, as of `add_blocks`; and the inverses.
     """
-    a = np.empty((3, 3))
     for k in range(first, inertia.shape[0]):
         for part in range(2):
-            for i in range(3):
-                free = inertia[k, 3 * part + i] > 0.0
-                for j in range(3):
-                    both = free and inertia[k, 3 * part + j] > 0.0
-                    a[i, j] = blocks[part, k, i, j] if both else 0.0
-                a[i, i] += inertia[k, 3 * part + i] if free else 1.0
-            cx = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
-            cy = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
-            cz = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
-            scale = 1.0 / (a[0, 0] * cx + a[0, 1] * cy + a[0, 2] * cz)
-            inverse = inverses[part, k]
-            inverse[0, 0], inverse[1, 0], inverse[2, 0] = scale * cx, scale * cy, scale * cz
-            inverse[0, 1] = scale * (a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2])
-            inverse[1, 1] = scale * (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0])
-            inverse[2, 1] = scale * (a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1])
-            inverse[0, 2] = scale * (a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1])
-            inverse[1, 2] = scale * (a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2])
-            inverse[2, 2] = scale * (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
-            for i in range(3):
-                if inertia[k, 3 * part + i] == 0.0:
-                    inverse[i, i] = 0.0
+            block, inverse = blocks[k, part], inverses[k, part]
+            dx, dy, dz = inertia[k, 3 * part], inertia[k, 3 * part + 1], inertia[k, 3 * part + 2]
+            fx, fy, fz = dx > 0.0, dy > 0.0, dz > 0.0
+            xx = block[0] + dx if fx else 1.0
+            yy = block[1] + dy if fy else 1.0
+            zz = block[2] + dz if fz else 1.0
+            yz = block[3] if fy and fz else 0.0
+            zx = block[4] if fz and fx else 0.0
+            xy = block[5] if fx and fy else 0.0
+            cx, cy, cz = yy * zz - yz * yz, yz * zx - xy * zz, xy * yz - yy * zx
+            scale = 1.0 / (xx * cx + xy * cy + zx * cz)
+            inverse[0] = scale * cx if fx else 0.0
+            inverse[1] = scale * (xx * zz - zx * zx) if fy else 0.0
+            inverse[2] = scale * (xx * yy - xy * xy) if fz else 0.0
+            inverse[3] = scale * (xy * zx - xx * yz)
+            inverse[4] = scale * cz
+            inverse[5] = scale * cy
 
 
 @kernel(error_model="numpy")
-def solve_for_changes(pairs, inertia, inverses, velocities, x, forces, room, tolerance, limit):
+def solve_for_changes(
+    pairs, contacts, mobilities, inertia, inverses, velocities, x, forces, yielded, room, tolerance, limit
+):
     """Solve (D⁻¹ + L) x = -L ẋ* for what moves freely, by preconditioned conjugate gradients; returns the iterations.
 
     Parameters
     ----------
-    pairs : Pairs
-    inertia : (m, 6) array
-        D⁻¹; zero for what moves on its own, where x is zero.
-    inverses : (2, m, 3, 3) array
-        Of the diagonal blocks of D⁻¹ + L, of velocities and of spins; zero in what moves on its own.
+    pairs, contacts : Pairs
+        L is the sum of both.
+    mobilities, inertia : (m, 6) arrays
+        D and D⁻¹; zero for what moves on its own, where x is zero.
+    inverses : (m, 2, 6) array
+        Of the diagonal blocks of D⁻¹ + L, as of `add_blocks`; zero in what moves on its own.
     velocities, x : (m, 6) arrays
         ẋ*; the start, and the result [m/s, rad/s].
-    forces : (m, 6) array
-        Filled in: -L (ẋ* + x) [N, N m].
+    forces, yielded : (m, 6) arrays
+        Filled in: what pairs and what contacts do at ẋ* + x [N, N m].
     room : (4, m, 6) array
         To work in.
     tolerance : float
@@ -247,56 +252,94 @@ def solve_for_changes(pairs, inertia, inverses, velocities, x, forces, room, tol
             if inertia[k, a] == 0.0:
                 x[k, a] = 0.0
             q[k, a] = velocities[k, a] + x[k, a]
-    lq[:] = 0.0
+            lq[k, a] = inertia[k, a] * x[k, a]
     add_resistance(pairs, q, lq)
+    add_resistance(contacts, q, lq)
     for k in range(m):
         for a in range(6):
-            forces[k, a] = -lq[k, a]
-            r[k, a] = forces[k, a] - inertia[k, a] * x[k, a] if inertia[k, a] > 0.0 else 0.0
-    rz = 0.0
-    for iteration in range(limit):
-        wrong = moving = changed = 0.0
-        for k in range(m):
-            for a in range(6):
-                if inertia[k, a] > 0.0:
-                    wrong += r[k, a] * r[k, a] / inertia[k, a]
-                    moving += inertia[k, a] * (velocities[k, a] + x[k, a]) ** 2
-                    changed += inertia[k, a] * x[k, a] ** 2
-        if wrong <= tolerance * tolerance * moving + 1e-10 * changed + 1e-300:
-            return iteration
-        before, rz = rz, _precondition(inverses, r, z)
-        turn = rz / before if iteration > 0 else 0.0
-        for k in range(m):
-            for a in range(6):
-                q[k, a] = z[k, a] + turn * q[k, a] if iteration > 0 else z[k, a]
-                lq[k, a] = 0.0
+            r[k, a] = -lq[k, a]
+    iteration = 0
+    before = 1.0
+    while True:
+        wrong, bound = _wrong_and_bound(mobilities, inertia, velocities, x, r, tolerance)
+        if wrong <= bound:
+            break
+        if iteration == limit:
+            return -1
+        rz = _precondition(inverses, r, z)
+        _turn(inertia, z, rz / before if iteration > 0 else 0.0, q, lq)
         add_resistance(pairs, q, lq)
-        power = 0.0
-        for k in range(m):
-            for a in range(6):
-                power += q[k, a] * (lq[k, a] + inertia[k, a] * q[k, a])
+        add_resistance(contacts, q, lq)
+        power = _product(q, lq)
         if not power > 0.0:
             return -1
-        along = rz / power
-        for k in range(m):
-            for a in range(6):
-                forces[k, a] -= along * lq[k, a]
-                if inertia[k, a] > 0.0:
-                    x[k, a] += along * q[k, a]
-                    r[k, a] -= along * (lq[k, a] + inertia[k, a] * q[k, a])
-    return -1
+        _go_along(rz / power, q, lq, x, r)
+        before = rz
+        iteration += 1
+    # What moves on its own has no inertia here: there the residual is the force itself.
+    for k in range(m):
+        for a in range(6):
+            q[k, a] = velocities[k, a] + x[k, a]
+            lq[k, a] = 0.0
+    add_resistance(contacts, q, lq)
+    for k in range(m):
+        for a in range(6):
+            yielded[k, a] = -lq[k, a]
+            forces[k, a] = r[k, a] + inertia[k, a] * x[k, a] - yielded[k, a]
+    return iteration
 
 
-@helper
+# Sums may be taken in any order: they are then formed four numbers at a time.
+@helper(fastmath={"reassoc", "contract"})
+def _wrong_and_bound(mobilities, inertia, velocities, x, r, tolerance):
+    wrong = moving = changed = 0.0
+    for k in range(x.shape[0]):
+        for a in range(6):
+            u = velocities[k, a] + x[k, a]
+            wrong += mobilities[k, a] * r[k, a] * r[k, a]
+            moving += inertia[k, a] * u * u
+            changed += inertia[k, a] * x[k, a] * x[k, a]
+    return wrong, tolerance * tolerance * moving + 1e-10 * changed + 1e-300
+
+
+@helper(fastmath={"contract"})
+def _turn(inertia, z, turn, q, lq):
+    """q = z + turn q, and lq = D⁻¹ q."""
+    for k in range(q.shape[0]):
+        for a in range(6):
+            along = z[k, a] + turn * q[k, a] if turn > 0.0 else z[k, a]
+            q[k, a] = along
+            lq[k, a] = inertia[k, a] * along
+
+
+@helper(fastmath={"reassoc", "contract"})
+def _product(a, b):
+    total = 0.0
+    for k in range(a.shape[0]):
+        for c in range(6):
+            total += a[k, c] * b[k, c]
+    return total
+
+
+@helper(fastmath={"contract"})
+def _go_along(step, q, lq, x, r):
+    for k in range(x.shape[0]):
+        for a in range(6):
+            x[k, a] += step * q[k, a]
+            r[k, a] -= step * lq[k, a]
+
+
+@helper(fastmath={"contract"})
 def _precondition(inverses, r, z):
     """z = M⁻¹ r; returns r·z."""
     product = 0.0
     for k in range(r.shape[0]):
         for part in range(2):
-            for a in range(3):
-                total = 0.0
-                for b in range(3):
-                    total += inverses[part, k, a, b] * r[k, 3 * part + b]
-                z[k, 3 * part + a] = total
-                product += total * r[k, 3 * part + a]
+            b = inverses[k, part]
+            x, y, w = r[k, 3 * part], r[k, 3 * part + 1], r[k, 3 * part + 2]
+            s = b[0] * x + b[5] * y + b[4] * w
+            t = b[5] * x + b[1] * y + b[3] * w
+            u = b[4] * x + b[3] * y + b[2] * w
+            z[k, 3 * part], z[k, 3 * part + 1], z[k, 3 * part + 2] = s, t, u
+            product += s * x + t * y + u * w
     return product

@@ -11,6 +11,7 @@ import numpy as np
 from porefv.dem.grain_model import GrainModel
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
+from porefv.system.kernels import kernel
 
 # Part of the edges that may have moved by more than the bound, and by how many times it at most.
 _PART, _MOST = 0.01, 5.0
@@ -33,19 +34,31 @@ class RelativeMotion:
         ends = np.sort(ends[(ends < n).any(axis=1)], axis=1)
         ends = np.stack(np.divmod(np.unique(ends @ np.array([n + 6, 1])), n + 6), axis=1)
         walled = ends[:, 1] >= n
-        self._pairs, self._walled = ends[~walled], ends[walled] - [0, n]
+        self._pairs, self._walled = (part.astype(np.uint32) for part in (ends[~walled], ends[walled] - [0, n]))
         self._centres, self._places = np.array(mesh.packing.centres), mesh.box.wall_places
         self._mean_radius = float(mesh.packing.radii.mean())
 
     def __call__(self, grains: GrainModel) -> float:
         """How far neighbours have moved past each other, over the mean radius."""
-        moved = grains.positions - self._centres
-        i, j = self._pairs.T
-        apart = np.sqrt(((moved[i] - moved[j]) ** 2).sum(axis=1))
-        k, wall = self._walled.T
-        from_walls = np.abs(moved[k, WALL_AXES[wall]] - (grains.box.wall_places - self._places)[wall])
-        both = np.concatenate([apart, from_walls])
+        both = np.empty(len(self._pairs) + len(self._walled))
         if not len(both):
             return 0.0
+        walls = grains.box.wall_places - self._places
+        _squares(self._pairs, self._walled, grains.positions - self._centres, walls, both)
         rank = min(int((1.0 - _PART) * len(both)), len(both) - 1)
-        return float(max(np.partition(both, rank)[rank], both.max() / _MOST)) / self._mean_radius
+        both.partition(rank)
+        return float(np.sqrt(max(both[rank], both[rank:].max() / _MOST**2))) / self._mean_radius
+
+
+@kernel
+def _squares(pairs, walled, moved, walls, squares):
+    """Fill in the squares of how far the members of pairs, and of grains and walls, have moved past each other."""
+    count = pairs.shape[0]
+    for c in range(count):
+        i, j = pairs[c, 0], pairs[c, 1]
+        x, y, z = moved[i, 0] - moved[j, 0], moved[i, 1] - moved[j, 1], moved[i, 2] - moved[j, 2]
+        squares[c] = x * x + y * y + z * z
+    for c in range(walled.shape[0]):
+        wall = walled[c, 1]
+        along = moved[walled[c, 0], WALL_AXES[wall]] - walls[wall]
+        squares[count + c] = along * along

@@ -1,7 +1,7 @@
 """Discrete element method: grains in contact, moved by explicit steps (C14 §2.1). It knows nothing of fluids."""
 
 from porefv.dem.dem import DEM
-from porefv.dem.grain_model import GrainModel, SpinningGrainModel
+from porefv.dem.grain_model import GrainModel, LongStepGrainModel, SpinningGrainModel
 from porefv.dem.growth import grow
 from porefv.dem.material import Material
 from porefv.dem.measurements import Contacts, Energies
@@ -12,6 +12,7 @@ from porefv.dem.sizes import Grading, UniformSizes
 from porefv.dem.strided_run import PackingState, mean_stress
 
 __all__ = [
-    "DEM", "Contacts", "Energies", "Grading", "GrainModel", "Material", "PackingState", "Plate", "SpinningGrainModel",
+    "DEM", "Contacts", "Energies", "Grading", "GrainModel", "LongStepGrainModel", "Material", "PackingState", "Plate",
+    "SpinningGrainModel",
     "UniformSizes", "cloud", "grow", "mean_stress", "settle",
 ]  # fmt: skip

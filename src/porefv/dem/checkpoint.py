@@ -21,7 +21,7 @@ from porefv.dem.plate import Plate
 from porefv.dem.state_files import ArrayOf, Arrays
 from porefv.errors import ComputationError, InputError
 
-FORMAT, VERSION = "porefv.dem", 4
+FORMAT, VERSION = "porefv.dem", 5
 
 # What entries are called in files of version 3, in which each thread had a range of contacts ...
 _NAMES_OF_VERSION_3 = {"ranges": "threads"}
@@ -159,8 +159,8 @@ def unpack(content: Arrays, path: str | PathLike[str]) -> DEM:
 
 
 def _renamed(header: dict[str, Any], content: Arrays) -> tuple[dict[str, Any], Arrays]:
-    """Header and content of an older file, with the names of version 4."""
-    old = _NAMES_OF_VERSION_3
+    """Header and content of an older file, with the names of version 5."""
+    old = _NAMES_OF_VERSION_3 if header["version"] <= 3 else {}
     if header["version"] <= 2:
         old = old | _NAMES_OF_VERSION_2
     if header["version"] == 1:
@@ -169,6 +169,7 @@ def _renamed(header: dict[str, Any], content: Arrays) -> tuple[dict[str, Any], A
         entries | {new: entries[name] for new, name in old.items() if name in entries}
         for entries in (header["numbers"], content)
     )
+    numbers = numbers | {"stride": 1}  # version 5 has long steps
     return header | {"numbers": numbers}, arrays
 
 

@@ -14,6 +14,7 @@ from porefv.dem.measurements import Contacts, Energies, contact_loads
 from porefv.dem.motion import CROWDED, FORCES, MOTION, RUNAWAY, WHOLE, Found, Loads, Motion, advance, free_motion
 from porefv.dem.pair_listing import list_pairs, ranges_for, set_stiffness
 from porefv.dem.plate import Plate
+from porefv.dem.yielding_contacts import YieldingContacts, find_yielding
 from porefv.errors import ComputationError, InputError
 from porefv.packing.box import WALL_AXES, WALL_SENSES, WALLS, Box
 from porefv.packing.neighbours import neighbour_pairs
@@ -133,6 +134,7 @@ class DEM:
         ranges = ranges_for(len(self))
         self._contact_loads = np.zeros((ranges, len(self), 6)), np.zeros((ranges, 6, 4))
         self.halfway = False
+        self._yielding = YieldingContacts.room(0)
 
     # ---- set-up -------------------------------------------------------------------------------------------------
 
@@ -202,13 +204,22 @@ class DEM:
         state = self.state
         before = state.grains.motion[:, :3].copy() if state.applied.any() else None
         done = 0
+        if steps > 0 and state.stride > 1:  # contacts slip over the whole of a long step before
+            self._advance(FORCES, 1, state.applied, np.zeros(6))
+            state.stride = 1
+            done += self._advance(MOTION, 1, state.applied, np.zeros(6))
         while done < steps:
             done += self._advance(WHOLE, steps - done, state.applied, np.zeros(6))
         if before is not None:
             state.applied_work += float((state.applied * (state.grains.motion[:, :3] - before)).sum())
 
-    def predict(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, stride: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Take the first half of a step: contact forces, but no motion; `correct` takes the other.
+
+        Parameters
+        ----------
+        stride : int
+            Length of the step, in steps. In one longer than a step contacts must yield: see `yielding_contacts`.
 
         Returns
         -------
@@ -230,10 +241,25 @@ class DEM:
         state = self.state
         if not self.halfway:
             self._advance(FORCES, 1, state.applied, np.zeros(6))
-            self.halfway = True
+            state.stride, self.halfway = stride, True
+            self._yielding = self._find_yielding() if stride > 1 else YieldingContacts.room(0)
         loads = Loads(*self._contact_loads, state.applied, np.zeros(6))
         velocities, speeds, mobilities = free_motion(self._parameters(), state.grains, state.walls, loads)
         return velocities, speeds, mobilities, state.walls.yields
+
+    @property
+    def yielding_contacts(self) -> YieldingContacts:
+        """Contacts that yield within the long step that `predict` has begun; none in another."""
+        return self._yielding
+
+    def _find_yielding(self) -> YieldingContacts:
+        state = self.state
+        room = YieldingContacts.room(len(state.pairs.others) + len(state.wall_pairs.members))
+        found = find_yielding(
+            self._parameters(), state.grains, state.pairs, state.wall_pairs, state.walls, self._contact_loads[0][0],
+            room,
+        )  # fmt: skip
+        return room.first(found)
 
     def predict_spins(self) -> tuple[np.ndarray, np.ndarray]:
         """Spins (n, 3) after the step that `predict` has begun, and dt / I (n,), grain i in row `rows[i]`.
@@ -248,11 +274,17 @@ class DEM:
         if not self.halfway:
             raise InputError("`predict_spins` is for a step that `predict` has begun")
         grains = self.state.grains
-        mobilities = self.step * grains.inverse_inertia
+        mobilities = self.state.stride * self.step * grains.inverse_inertia
         torques = self._contact_loads[0][:, :, 3:].sum(axis=0)
         return grains.motion[:, 7:10] + mobilities[:, None] * torques, mobilities
 
-    def correct(self, forces: np.ndarray, thrusts: np.ndarray, torques: np.ndarray | None = None) -> None:
+    def correct(
+        self,
+        forces: np.ndarray,
+        thrusts: np.ndarray,
+        torques: np.ndarray | None = None,
+        yielded: np.ndarray | None = None,
+    ) -> None:
         """Take the second half of a step, after `predict`, under forces on grains and walls besides all others.
 
         Parameters
@@ -263,17 +295,23 @@ class DEM:
             On the walls, along their outward normals [N].
         torques : (n, 3) array, optional
             On the grains, in the same rows, over this step alone [N m].
+        yielded : (n + 6, 6) array, optional
+            What contacts that yield add to forces and torques on grains, in the same rows, and walls [N, N m].
         """
         if not self.halfway:
             raise InputError("`correct` ends a step that `predict` has begun")
         self.halfway = False
         if torques is not None:
             self._contact_loads[0][0, :, 3:] += torques
+        if yielded is not None:
+            self._contact_loads[0][0] += yielded[:-6]
+            self.state.walls.forces[:] += yielded[-6:, :3]
         applied = self.state.applied + forces
         self._advance(MOTION, 1, applied, np.asarray(thrusts, float))
-        self.state.applied_work += self.step * float((applied * self.state.grains.motion[:, 4:7]).sum())
+        dt = self.state.stride * self.step
+        self.state.applied_work += dt * float((applied * self.state.grains.motion[:, 4:7]).sum())
         if torques is not None:
-            self.state.applied_work += self.step * float((torques * self.state.grains.motion[:, 7:10]).sum())
+            self.state.applied_work += dt * float((torques * self.state.grains.motion[:, 7:10]).sum())
 
     def _advance(self, half: int, steps: int, applied: np.ndarray, thrusts: np.ndarray) -> int:
         """Take steps until pairs must be listed anew; returns how many."""
@@ -287,8 +325,8 @@ class DEM:
                 Found.of(ranges_for(len(self))), state.work,
             ),
         )  # fmt: skip
-        state.steps += taken
-        state.time += taken * self.step
+        state.steps += taken * state.stride
+        state.time += taken * state.stride * self.step
         if reason == RUNAWAY:
             self._fail()
         if reason == CROWDED:
@@ -297,7 +335,8 @@ class DEM:
 
     def _parameters(self) -> StepParameters:
         # Integers among them would compile the kernels anew.
-        step, ratio, friction = float(self.step), float(self.material.stiffness_ratio), self.material.friction
+        step = float(self.state.stride * self.step)
+        ratio, friction = float(self.material.stiffness_ratio), self.material.friction
         return StepParameters(step, ratio, friction, self.gravity, float(self.damping), _GAIN, self.fastest)
 
     @property
@@ -308,7 +347,7 @@ class DEM:
     @property
     def fastest(self) -> float:
         """Speed at which the motion counts as runaway [m/s]."""
-        return _RUNAWAY * self._smallest / self.step
+        return _RUNAWAY * self._smallest / (self.state.stride * self.step)
 
     def run_to_rest(self, unbalanced: float = 1e-3, stress: float = 1e-2, most: int = 200_000) -> int:
         """Take steps until the grains are at rest and walls press with their stresses; returns how many.
@@ -400,6 +439,16 @@ class DEM:
     def places(self) -> np.ndarray:
         """(6,): coordinate of each wall along its axis [m]."""
         return self.state.walls.places
+
+    @property
+    def presses(self) -> bool:
+        """Whether a wall presses with a given stress."""
+        return not np.isnan(self.state.walls.targets).all()
+
+    @property
+    def last_step(self) -> float:
+        """Length of the last step: `step`, or several of it where grains and fluid took a long one [s]."""
+        return self.state.stride * self.step
 
     @property
     def wall_velocities(self) -> np.ndarray:
@@ -513,7 +562,7 @@ class DEM:
     @property
     def energies(self) -> Energies:
         """Energies at time t."""
-        return Energies.of(self.state, self._parameters())
+        return Energies.of(self.state, self._parameters()._replace(dt=float(self.step)))
 
     def __repr__(self) -> str:
         return f"DEM({len(self)} grains, {self.steps} steps of {self.step:.3g} s, porosity {self.porosity:.4f})"

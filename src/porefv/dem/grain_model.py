@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from porefv.dem.yielding_contacts import YieldingContacts
 from porefv.packing.box import Box
 
 
@@ -103,4 +104,33 @@ class SpinningGrainModel(GrainModel, Protocol):
 
     def correct(self, forces: np.ndarray, thrusts: np.ndarray, torques: np.ndarray | None = None) -> None:
         """As of `GrainModel`, with torques on the grains (n, 3), in the same rows [N m]."""
+        ...
+
+
+@runtime_checkable
+class LongStepGrainModel(SpinningGrainModel, Protocol):
+    """A grain model that takes steps longer than its own, in which contacts yield: what long coupled steps ask for."""
+
+    @property
+    def presses(self) -> bool:
+        """Whether a wall presses with a given stress: it moves by its own law, in steps that are not long."""
+        ...
+
+    @property
+    def yielding_contacts(self) -> YieldingContacts:
+        """After `predict`: contacts that yield within a long step (`porefv.dem.yielding_contacts`)."""
+        ...
+
+    def predict(self, stride: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As of `GrainModel`, for a step as long as `stride` steps."""
+        ...
+
+    def correct(
+        self,
+        forces: np.ndarray,
+        thrusts: np.ndarray,
+        torques: np.ndarray | None = None,
+        yielded: np.ndarray | None = None,
+    ) -> None:
+        """As of `SpinningGrainModel`, with what contacts that yield add: (n + 6, 6), grains in rows, walls [N, N m]."""
         ...

@@ -166,6 +166,8 @@ class GrainState:
         Taken since the start.
     time : float
         t [s].
+    stride : int
+        Length of the last step, in steps: more than 1 where grains and fluid have taken a long one.
     """
 
     order: Annotated[np.ndarray, ArrayOf("i8", ("n",))]
@@ -180,6 +182,7 @@ class GrainState:
     applied_work: float
     steps: int
     time: float
+    stride: int
 
     @classmethod
     def of(cls, packing: Packing) -> GrainState:
@@ -212,6 +215,7 @@ class GrainState:
             applied_work=0.0,
             steps=0,
             time=0.0,
+            stride=1,
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -253,3 +257,4 @@ class GrainState:
         must(bool((self.walls.places[::2] < self.walls.places[1::2]).all()), "walls_places make no box")
         must(0.0 <= self.listing.slack <= motion[:, 3].min(), "listing_slack is not within a radius")
         must(self.steps >= 0, "steps are negative")
+        must(self.stride >= 1, "stride is not positive")

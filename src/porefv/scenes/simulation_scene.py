@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationInfo, field_validator
 
 from porefv.conductance.model import ConductanceModel
-from porefv.coupling.coupling_settings import SCHEMES
+from porefv.coupling.coupling_settings import MOST_STRIDE, SCHEMES
 from porefv.coupling.exchange import EXCHANGES
 from porefv.coupling.walls_in_time import WallHistories, WallHistory
 from porefv.dem.dem import DEM
@@ -91,6 +91,11 @@ class CouplingTable(ConductanceTable):
     )
     roughness: Annotated[float, Limits("must lie in [1e-6, 0.2]", least=1e-6, most=0.2)] = key(
         "gap between two grains, as a part of their mean radius, below which lubrication grows no more", 0.02
+    )
+    stride: Annotated[int, Whole(least=1, most=MOST_STRIDE)] = key(
+        "longest [step of grains and fluid together](coupling.md#long-steps), in steps of the grains, 1 to 20. More "
+        "than 1 needs `pair_resistance`",
+        1,
     )
 
     def make(self) -> CouplingOptions:

@@ -106,16 +106,17 @@ class Numbers:
 
 
 class Whole:
-    """A whole number, `least` or more; 2.0 is one."""
+    """A whole number, `least` or more, and `most` or less; 2.0 is one."""
 
-    def __init__(self, least: int):
-        self.least = least
+    def __init__(self, least: int, most: int | None = None):
+        self.least, self.most = least, most
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        number = core_schema.int_schema(strict=True, ge=self.least)
+        number = core_schema.int_schema(strict=True, ge=self.least, le=self.most)
+        bounds = f"{self.least} or more" if self.most is None else f"{self.least} to {self.most}"
         return core_schema.custom_error_schema(
             core_schema.no_info_before_validator_function(_without_fraction, number),
-            custom_error_type=EXPECTED, custom_error_message=f"a whole number, {self.least} or more",
+            custom_error_type=EXPECTED, custom_error_message=f"a whole number, {bounds}",
         )  # fmt: skip
 
 

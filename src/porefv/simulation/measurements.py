@@ -132,7 +132,7 @@ def momentum_residual(dem: DEM, coupling: Coupling | None, before: np.ndarray) -
     """
     if dem.damping > 0.0:
         return np.nan
-    rate = (momentum(dem) - before) / dem.step
+    rate = (momentum(dem) - before) / dem.last_step
     outside = dem.masses.sum() * dem.gravity + dem.applied.sum(axis=0)
     on_walls = dem.last_wall_forces
     if coupling is not None:

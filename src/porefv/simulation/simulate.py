@@ -322,9 +322,10 @@ class _Run:
         while not ended:
             times = (rows, strides, self._profile_times, self._frame_times)
             target = int(min(last, *(each.next(dem.steps) for each in times)))
-            self._advance(target - dem.steps - 1)
+            while (left := target - dem.steps) > self._stride:  # it may change on the way
+                self._advance(left - self._stride)
             before = measurements.momentum(dem)
-            self._advance(1)
+            self._advance(left)
             residual = measurements.momentum_residual(dem, self.coupling, before)
             ended = self._ended(stage, last, look=strides.due(target, ended=False))
             self._record(k, residual, row=rows.due(target, ended), ended=ended)
@@ -348,6 +349,11 @@ class _Run:
         default = ROW_STEPS * self.dem.step if isinstance(stage.end, Rest) else stage.end / ROWS
         return stage.every or self.scene.output.every or default
 
+    @property
+    def _stride(self) -> int:
+        """Steps that the next one may be long."""
+        return 1 if self.coupling is None else self.coupling.stride
+
     def _advance(self, steps: int) -> None:
         coupling = self.coupling
         if coupling is None:
@@ -355,10 +361,12 @@ class _Run:
         elif self._walls.steady:
             coupling.run(steps)
         else:
-            for _ in range(steps):
+            end = self.dem.steps + steps
+            while self.dem.steps < end:
                 # Pressures act over a step: they are those of its middle.
-                coupling.set_walls(self._walls.at(self.dem.time + 0.5 * self.dem.step))
-                coupling.run(1)
+                one = min(coupling.stride, end - self.dem.steps)
+                coupling.set_walls(self._walls.at(self.dem.time + 0.5 * one * self.dem.step))
+                coupling.run(one)
 
     def _ended(self, stage: Stage, last: int, look: bool) -> bool:
         """Whether a stage is at its end; `look` whether grains are at rest.
