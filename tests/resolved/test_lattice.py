@@ -89,7 +89,7 @@ def small(request):
 
 
 def test_forces_add_up_to_the_thrust_and_flux_is_conserved(small):
-    mesh, walls, reference = small
+    _, _, reference = small
     values = reference.values
     total = values.sphere_total.sum(axis=0) + (values.wall_pressure + values.wall_viscous).sum(axis=0)
     assert_allclose(total, [0.0, 2.0, 0.0], atol=1e-3)

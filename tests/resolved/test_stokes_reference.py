@@ -67,7 +67,8 @@ def made_up(mesh_of):
     arrays = [rng.normal(size=shape) for shape in [*shapes, mesh.n_cells]]
     arrays[-1][::3] = np.nan
     return StokesReference(
-        name="made up", method="finite-elements", packing=mesh.packing, walls=Walls.along("y", slip=True), viscosity=2.0, values=Values(*arrays),
+        name="made up", method="finite-elements", packing=mesh.packing,
+        walls=Walls.along("y", slip=True), viscosity=2.0, values=Values(*arrays),
         errors={"permeability": 1e-6}, permeability=3e-4, order=3, contacts="caps",
         runs=[Run(0.5, 0.03, 10, 100, 0, 1.0, 3e-4, 1e-16, 1e-3)], cells=mesh.cells,
         facet_vertices=mesh.facets.vertices, facet_cells=mesh.facets.cells, face_cells=mesh.wall_faces.cells,
