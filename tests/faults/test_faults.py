@@ -208,9 +208,10 @@ def resolved(data_packing):
 
 
 def test_reference(survives, old, resolved, monkeypatch):
-    monkeypatch.setattr("porefv.resolved.refinement.require_ngsolve", lambda: None)
-    monkeypatch.setattr("porefv.resolved.refinement.stokes_reference", lambda *arguments, **options: resolved)
-    arguments = ["reference", "scene.toml", "--quiet", "--out", "flow.json", "--force"]
+    monkeypatch.setattr("porefv.resolved.lattice_reference.lattice_reference", lambda *arguments, **options: resolved)
+    arguments = [
+        "reference", "scene.toml", "--quiet", "--method", "lattice-boltzmann", "--out", "flow.json", "--force",
+    ]  # fmt: skip
 
     def prepare(folder):
         put(old, folder, "scene.toml")

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from porefv.resolved.reference import StokesReference
 
 
+# Spheres up to which finite elements are the default, where they are installed.
+_ELEMENTS_UP_TO = 50
+
+
 def register(commands: Any) -> None:
     """Add the command to the command line."""
     parser = add_command(
@@ -23,6 +27,11 @@ def register(commands: Any) -> None:
     )  # fmt: skip
     add_run_options(parser, force="replace a file that exists")
     parser.add_argument("--out", metavar="FILE.json", type=Path, help="file to write; by the results directory's name")
+    parser.add_argument(
+        "--method", choices=("auto", "finite-elements", "lattice-boltzmann"), default="auto",
+        help="auto: finite elements up to 50 spheres where they are installed, or else a lattice",
+    )  # fmt: skip
+    parser.add_argument("--nodes", type=float, default=12.0, help="of the lattice in the mean radius (default 12)")
     parser.add_argument("--order", type=int, default=3, help="of the velocity's polynomials, 2 to 4 (default 3)")
     parser.add_argument(
         "--mesh-size", type=float, default=0.5, help="of elements on a sphere, over its radius (default 0.5)"
@@ -35,13 +44,17 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
-    from porefv.resolved.refinement import STAGES, Options, require_ngsolve, stokes_reference
+    from porefv.resolved.lattice_reference import STAGES as LATTICE_STAGES
+    from porefv.resolved.lattice_reference import LatticeOptions, cost, lattice_reference
+    from porefv.resolved.refinement import STAGES, Options, has_ngsolve, require_ngsolve, stokes_reference
     from porefv.scenes.flow_scene import FlowScene
     from porefv.system.atomic_files import locked
     from porefv.system.progress import Progress
 
-    require_ngsolve()
+    if options.method == "finite-elements":
+        require_ngsolve()
     fineness = Options(options.order, options.mesh_size, options.delta, options.contacts, options.single)
+    lattice = LatticeOptions(options.nodes, options.single)
     scene = FlowScene.read(options.scene)
     scene.ensure_driven_by_pressures_of_walls()
     directory = scene.output.directory
@@ -52,11 +65,22 @@ def run(options: argparse.Namespace) -> None:
         if target.exists() and not options.force:
             raise InputError(f"{target} exists already: choose another with --out, or add --force")
         mesh = scene.pore_mesh()
-        progress = Progress(STAGES, quiet=options.quiet)
-        reference = stokes_reference(
-            mesh, scene.walls, scene.fluid.viscosity, fineness,
-            name=options.scene.stem, progress=progress, threads=options.threads or 1,
-        )  # fmt: skip
+        by_elements = options.method == "finite-elements" or (
+            options.method == "auto" and mesh.n_spheres <= _ELEMENTS_UP_TO and has_ngsolve()
+        )
+        if by_elements:
+            reference = stokes_reference(
+                mesh, scene.walls, scene.fluid.viscosity, fineness, name=options.scene.stem,
+                progress=Progress(STAGES, quiet=options.quiet), threads=options.threads or 1,
+            )  # fmt: skip
+        else:
+            if not options.quiet:
+                say(f"lattice: {cost(mesh, lattice)}")
+            reference = lattice_reference(
+                mesh, scene.walls, scene.fluid.viscosity, lattice, name=options.scene.stem,
+                progress=Progress(LATTICE_STAGES, quiet=options.quiet), threads=options.threads,
+                state=target.with_name(f".{target.name}.porefv-state"),
+            )  # fmt: skip
         reference.write(target)
     if not options.quiet:
         say(comparison_text(reference, scene.pore_flow(mesh)))
@@ -66,6 +90,8 @@ def run(options: argparse.Namespace) -> None:
 def comparison_text(reference: StokesReference, flow: PoreFlow) -> str:
     """The resolved flow and that of a conductance model, side by side."""
     import numpy as np
+
+    from porefv.resolved.reference import LatticeRun
 
     def rms(error: np.ndarray, scale: np.ndarray) -> str:
         return f"{100.0 * np.sqrt((error**2).sum() / (scale**2).sum()):.2g} %"
@@ -96,8 +122,9 @@ def comparison_text(reference: StokesReference, flow: PoreFlow) -> str:
     differences("forces, rms", forces, flow.forces.pressure + flow.forces.viscous, errors.get("forces"))
     differences("fluxes of throats, rms", reference.throat_flux(mesh), flow.flux, errors.get("facet_flux"))
     for run in reference.runs:
-        lines.append(
-            f"mesh size {run.mesh_size:g}, δ {run.delta:g}: {run.elements} elements, {run.unknowns} unknowns, "
-            f"permeability {run.permeability:.6g} m², {run.seconds:.0f} s"
-        )
+        if isinstance(run, LatticeRun):
+            how = f"{run.nodes:g} nodes in a radius: {run.fluid_nodes} nodes in the fluid, {run.steps} steps"
+        else:
+            how = f"mesh size {run.mesh_size:g}, δ {run.delta:g}: {run.elements} elements, {run.unknowns} unknowns"
+        lines.append(f"{how}, permeability {run.permeability:.6g} m², {run.seconds:.0f} s")
     return "\n".join(lines)

@@ -1,4 +1,6 @@
-"""Resolved Stokes flow through the packings of a scene, a reference for the finite volumes: needs `porefv[reference]`.
+"""Resolved Stokes flow through the packings of a scene, a reference for the finite volumes.
+
+By a lattice-Boltzmann method, or by finite elements: these need `porefv[reference]`.
 
 `porefv reference SCENE.toml` computes it; `StokesReference.read` reads what was computed::
 
@@ -12,14 +14,20 @@
 
 from porefv.system.lazy_exports import lazy_exports
 
-__all__ = ["Options", "Run", "StokesReference", "Values", "stokes_reference"]
+__all__ = [
+    "LatticeOptions", "LatticeRun", "Options", "Run", "StokesReference", "Values", "lattice_reference",
+    "stokes_reference",
+]  # fmt: skip
 __getattr__, __dir__ = lazy_exports(
     __name__,
     {
+        "LatticeOptions": "porefv.resolved.lattice_reference",
+        "LatticeRun": "porefv.resolved.reference",
         "Options": "porefv.resolved.refinement",
         "Run": "porefv.resolved.reference",
         "StokesReference": "porefv.resolved.reference",
         "Values": "porefv.resolved.reference",
+        "lattice_reference": "porefv.resolved.lattice_reference",
         "stokes_reference": "porefv.resolved.refinement",
     },
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import version
 from os import PathLike
@@ -55,6 +56,34 @@ class Run:
     elements: int
     unknowns: int
     straightened: int
+    seconds: float
+    permeability: float
+    thrust_residual: float
+    flux_imbalance: float
+
+
+@dataclass(frozen=True)
+class LatticeRun:
+    """The flow on one lattice, and how it was computed.
+
+    Attributes
+    ----------
+    nodes : float
+        Spacings in the mean radius.
+    shape : (3,) tuple of int
+        Nodes along x, y and z.
+    fluid_nodes, steps : int
+        Nodes in the fluid; steps until the flow was at rest.
+    seconds : float
+        Wall time.
+    permeability, thrust_residual, flux_imbalance : float
+        See `Run`.
+    """
+
+    nodes: float
+    shape: tuple[int, int, int]
+    fluid_nodes: int
+    steps: int
     seconds: float
     permeability: float
     thrust_residual: float
@@ -167,42 +196,44 @@ class StokesReference:
     Attributes
     ----------
     name : str
+    method : {'finite-elements', 'lattice-boltzmann'}
     packing : Packing
     walls : Walls
     viscosity : float
         [Pa s]
     values : Values
-        The best there are: of the finest run, extrapolated to δ = 0 where there are contacts.
+        The best there are: of the finest run, extrapolated to δ = 0 where there are contacts, or to a spacing of 0.
     errors : dict of str to float
         Error bars: `permeability` [m²]; `forces`, `facet_flux`, `cell_pressure`, rms over those of the values.
     permeability : float
         NaN unless driven along one axis [m²].
-    order : int
-        Of the velocity; the pressure's is one less.
-    contacts : str
-        How contacts are regularised: caps, bridges.
-    runs : list of Run
+    runs : list of Run or of LatticeRun
     cells, facet_vertices, facet_cells, face_cells, face_walls : int arrays
         Of the mesh that the values stand on.
     versions : dict of str to str
+    order : int or None
+        Of the velocity of finite elements; the pressure's is one less.
+    contacts : str or None
+        How finite elements regularise contacts: caps, bridges.
     """
 
     name: str
+    method: str
     packing: Packing
     walls: Walls
     viscosity: float
     values: Values
     errors: dict[str, float]
     permeability: float
-    order: int
-    contacts: str
-    runs: list[Run]
+    runs: Sequence[Run | LatticeRun]
     cells: np.ndarray
     facet_vertices: np.ndarray
     facet_cells: np.ndarray
     face_cells: np.ndarray
     face_walls: np.ndarray
     versions: dict[str, str] = field(default_factory=dict)
+    order: int | None = None
+    contacts: str | None = None
 
     # ---- on a mesh ----------------------------------------------------------------------------------------------
 
@@ -258,7 +289,8 @@ class StokesReference:
         content = {
             "kind": _KIND,
             "name": self.name,
-            "about": "Stokes flow, Taylor-Hood finite elements on curved tetrahedra; SI units; see docs/reference.md",
+            "method": self.method,
+            "about": f"Stokes flow, {_METHODS[self.method][0]}; SI units; see docs/reference.md",
             "packing": {
                 "lower": box.lower, "upper": box.upper, "centres": self.packing.centres, "radii": self.packing.radii
             },
@@ -292,9 +324,14 @@ class StokesReference:
         if not isinstance(content, dict) or content.get("kind") != _KIND:
             raise InputError(f"{path} holds no resolved flow of porefv reference")
         packing, mesh, values = content["packing"], content["mesh"], content["values"]
+        method = content.get("method", "finite-elements")
+        if method not in _METHODS:
+            raise InputError(f"{path} is of the method {method!r}, which this version does not know")
+        _, kind = _METHODS[method]
         shapes = {"cells": 4, "facet_vertices": 3, "facet_cells": 2}
         return cls(
             name=content["name"],
+            method=method,
             packing=Packing(packing["centres"], packing["radii"], Box(packing["lower"], packing["upper"])),
             walls=Walls(**{name: Wall(**wall) for name, wall in content["walls"].items()}),
             viscosity=content["viscosity"],
@@ -303,7 +340,7 @@ class StokesReference:
             permeability=_number(content["permeability"]),
             order=content["order"],
             contacts=content["contacts"],
-            runs=[Run(**{key: _number(value) for key, value in run.items()}) for run in content["runs"]],
+            runs=[kind(**{key: _number(value) for key, value in run.items()}) for run in content["runs"]],
             versions=content["versions"],
             **{
                 name: np.array(mesh[name], np.int32).reshape((-1, shapes[name]) if name in shapes else -1)
@@ -312,6 +349,11 @@ class StokesReference:
         )
 
 
+# What each method is, and the class of its runs.
+_METHODS: dict[str, tuple[str, Any]] = {
+    "finite-elements": ("Taylor-Hood finite elements on curved tetrahedra", Run),
+    "lattice-boltzmann": ("lattice-Boltzmann method with two relaxation times", LatticeRun),
+}
 _MESH = ("cells", "facet_vertices", "facet_cells", "face_cells", "face_walls")
 
 
@@ -354,7 +396,17 @@ def _text(content: dict[str, Any]) -> str:
     return "{\n " + ",\n ".join(lines) + "\n}\n"
 
 
-def versions() -> dict[str, str]:
+def permeability_of(values: Values, mesh: PoreMesh, walls: Walls, viscosity: float) -> float:
+    """Along the axis of the flow, by the mean of inflow and outflow [m²]; NaN unless it is along one axis."""
+    axis = walls.axis
+    if axis is None or walls.pressures[2 * axis] == walls.pressures[2 * axis + 1]:
+        return float("nan")
+    drop = walls.pressures[2 * axis] - walls.pressures[2 * axis + 1]
+    flux = 0.5 * (values.wall_flux[2 * axis] - values.wall_flux[2 * axis + 1])
+    return float(viscosity * flux * mesh.box.size[axis] / (drop * mesh.box.section(axis)))
+
+
+def versions(*packages: str) -> dict[str, str]:
     """Of what the numbers depend on."""
     found = {"porefv": __version__, "python": platform.python_version()}
-    return found | {name: version(name) for name in ("numpy", "ngsolve", "netgen-mesher")}
+    return found | {name: version(name) for name in packages}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import nullcontext
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from porefv.errors import InputError, MissingExtraError
 from porefv.flow.walls import Walls, ensure_no_imposed_flow
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.resolved.fluid_geometry import REGULARISATIONS, contacts
-from porefv.resolved.reference import Run, StokesReference, Values, read_off, versions
+from porefv.resolved.reference import Run, StokesReference, Values, permeability_of, read_off, versions
 from porefv.system.progress import Progress
 
 STAGES = ("meshing", "assembly", "solve", "reading off")
@@ -119,12 +120,13 @@ def stokes_reference(
     errors = {} if options.single else _errors([v for v, _ in found], values, mesh, walls, viscosity)
     return StokesReference(
         name=name,
+        method="finite-elements",
         packing=mesh.packing,
         walls=walls,
         viscosity=viscosity,
         values=values,
         errors=errors,
-        permeability=_permeability(values, mesh, walls, viscosity),
+        permeability=permeability_of(values, mesh, walls, viscosity),
         order=options.order,
         contacts=options.contacts,
         runs=[run for _, run in found],
@@ -133,17 +135,19 @@ def stokes_reference(
         facet_cells=mesh.facets.cells,
         face_cells=mesh.wall_faces.cells,
         face_walls=mesh.wall_faces.walls,
-        versions=versions(),
+        versions=versions("numpy", "ngsolve", "netgen-mesher"),
     )
+
+
+def has_ngsolve() -> bool:
+    """Whether the extra is installed."""
+    return all(find_spec(name) is not None for name in ("netgen", "ngsolve"))
 
 
 def require_ngsolve() -> None:
     """MissingExtraError if the extra is not installed."""
-    try:
-        import netgen.csg  # noqa: F401
-        import ngsolve  # noqa: F401
-    except ModuleNotFoundError:
-        raise MissingExtraError("ngsolve", "A resolved Stokes reference") from None
+    if not has_ngsolve():
+        raise MissingExtraError("ngsolve", "A resolved Stokes reference by finite elements")
 
 
 def _touching(mesh: PoreMesh, delta: float) -> bool:
@@ -183,7 +187,7 @@ def _run(
         unknowns=field.unknowns,
         straightened=domain.straightened,
         seconds=round(time.perf_counter() - begin, 2),
-        permeability=_permeability(values, mesh, walls, viscosity),
+        permeability=permeability_of(values, mesh, walls, viscosity),
         thrust_residual=field.residual,
         flux_imbalance=imbalance,
     )
@@ -191,20 +195,11 @@ def _run(
     return values, run
 
 
-def _permeability(values: Values, mesh: PoreMesh, walls: Walls, viscosity: float) -> float:
-    axis = walls.axis
-    if axis is None or walls.pressures[2 * axis] == walls.pressures[2 * axis + 1]:
-        return float("nan")
-    drop = walls.pressures[2 * axis] - walls.pressures[2 * axis + 1]
-    flux = 0.5 * (values.wall_flux[2 * axis] - values.wall_flux[2 * axis + 1])
-    return float(viscosity * flux * mesh.box.size[axis] / (drop * mesh.box.section(axis)))
-
-
 def _errors(levels: list[Values], values: Values, mesh: PoreMesh, walls: Walls, viscosity: float) -> dict[str, float]:
     """Error bars: between the two meshes, and half of what was extrapolated."""
 
     def permeability(of: Values) -> float:
-        return _permeability(of, mesh, walls, viscosity)
+        return permeability_of(of, mesh, walls, viscosity)
 
     def rms(difference: np.ndarray, scale: np.ndarray) -> float:
         known = np.isfinite(difference) & np.isfinite(scale)
