@@ -73,8 +73,8 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     polydata.SetPoints(vtk_points(packing.centres))
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
     attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
-    if packing.box is not None:
-        attach(polydata.GetFieldData(), {"box_lower": packing.box.lower, "box_upper": packing.box.upper}, 3)
+    if packing.walled_box is not None:
+        attach(polydata.GetFieldData(), {"box_lower": packing.walled_box.lower, "box_upper": packing.walled_box.upper}, 3)
     return polydata
 
 

@@ -69,8 +69,8 @@ class CellMesh(FixedInputs):
             packing = packing.with_box(box)
         self.packing = packing.validate(wall_tolerance)
         self.wall_tolerance = wall_tolerance
-        assert packing.box is not None  # validate has seen to it
-        self.box: Box = packing.box
+        assert packing.walled_box is not None  # validate has seen to it
+        self.box: Box = packing.walled_box
 
     # ---- topology ---------------------------------------------------------------------------------------------
 
@@ -132,7 +132,7 @@ class CellMesh(FixedInputs):
     @lazy_property
     def vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex (power centre) of each cell [m]."""
-        return self.local_vertices + self.triangulation.origin
+        return self.local_vertices[: self.n_cells] + self.triangulation.origin
 
     @lazy_property
     def cell_volumes(self) -> np.ndarray:
