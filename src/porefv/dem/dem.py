@@ -523,7 +523,7 @@ def _check_grains(packing: Packing) -> None:
     """Grains must have a box, their centres in it, and none of their centres inside another grain."""
     if packing.walled_box is None:
         raise InputError("the packing has no box; give it one: its walls hold the grains")
-    outside = ((packing.centres <= packing.walled_box.lower) | (packing.centres >= packing.walled_box.upper)).any(axis=1)
+    outside = (packing.walled_box.wall_distances(packing.centres) <= 0.0).any(axis=1)
     if outside.any():
         grain = int(np.argmax(outside))
         raise InputError(f"grain {grain} has its centre outside the box; move it, or enlarge the box")

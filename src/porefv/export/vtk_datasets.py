@@ -12,7 +12,7 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.export.cell_data import values_by_cell
 from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points, write_xml
-from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.cell_mesh import CellMesh, ensure_walls
 from porefv.mesh.polyhedra import polyhedra
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.mesh.throats import Throats
@@ -74,7 +74,9 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
     attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
     if packing.walled_box is not None:
-        attach(polydata.GetFieldData(), {"box_lower": packing.walled_box.lower, "box_upper": packing.walled_box.upper}, 3)
+        attach(
+            polydata.GetFieldData(), {"box_lower": packing.walled_box.lower, "box_upper": packing.walled_box.upper}, 3
+        )
     return polydata
 
 
@@ -86,6 +88,7 @@ def throats_polydata(
     Points are Laguerre vertices, that of a united pore the mean of several. They have the point data `pore` (id),
     `volume` and those given (n_pores rows).
     """
+    ensure_walls(throats.mesh)
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(throats.mesh.pore_centres))
     polydata.SetLines(cell_array(throats.pores))

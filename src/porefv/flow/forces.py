@@ -181,8 +181,8 @@ def facet_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit = "surface"
     united pore is taken as a throat of its own.
     """
     forces = np.empty((len(mesh.facets.cells), 3, 3))
-    for rows, unit_forces in unit_forces(mesh, slip, split, within=True):
-        forces[rows] = unit_forces.pressure + unit_forces.drag
+    for rows, found in unit_forces(mesh, slip, split, within=True):
+        forces[rows] = found.pressure + found.drag
     return forces
 
 

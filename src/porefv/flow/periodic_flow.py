@@ -106,7 +106,7 @@ class PeriodicFlow(FixedInputs):
 
     @lazy_property
     def permeability_by_flux(self) -> np.ndarray:
-        """(3, 3): the same tensor from the mean flux; row a is the flow along a, column b the axis of the gradient [m²].
+        """(3, 3): the same tensor from the mean flux, by its axis (row) and that of the gradient (column) [m²].
 
         Its difference from `permeability` shows how exactly the pressure equation is solved.
         """
@@ -135,7 +135,7 @@ class PeriodicFlow(FixedInputs):
 
     @property
     def principal_axes(self) -> np.ndarray:
-        """(3, 3): unit vectors along which flow and gradient are parallel, a row each, of the largest permeability first.
+        """(3, 3): unit vectors along which flow and gradient are parallel, a row each, in the same order.
 
         Where permeabilities are equal but for rounding, as those of cubic lattices are, axes are arbitrary.
         """

@@ -97,10 +97,8 @@ def solve_gradients(
     return GradientSolutions(pressures, drops, parts, tuple(reports))
 
 
-def _levels(
-    pairs: np.ndarray, areas: np.ndarray, drops: np.ndarray, parts: np.ndarray, tolerance: float
-) -> np.ndarray:
-    """(3, n_pores): what the pressure of each part is raised by, from the drops (3, c) between pairs (c, 2) of parts."""
+def _levels(pairs: np.ndarray, areas: np.ndarray, drops: np.ndarray, parts: np.ndarray, tolerance: float) -> np.ndarray:
+    """(3, n_pores): what the pressure of each part is raised by, from drops (3, c) between pairs (c, 2) of parts."""
     n = len(parts)
     first = np.bincount(parts, minlength=n).argmax()  # the largest part stays
     free = np.zeros(n, bool)

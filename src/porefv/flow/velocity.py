@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 
 
@@ -29,6 +30,7 @@ def pore_velocities(
     -------
     (n_pores, 3) array [m/s]; zero for pores without volume.
     """
+    ensure_walls(mesh)
     throats = mesh.throats
     centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]
     centres /= np.maximum(throats.areas, np.finfo(float).tiny)[:, None]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv.errors import InputError
 from porefv.mesh.cell_kernels import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_gradients
 from porefv.mesh.facets import Facets
 from porefv.mesh.flat_cells import settle_flat_cells
@@ -44,6 +45,12 @@ class WallFaces:
     centroids: np.ndarray
 
 
+NO_WALLS = (
+    "a periodic mesh has no walls, which this needs: use PeriodicFlow for its flow, or put the packing in a box with "
+    "walls, and use PoreMesh"
+)
+
+
 class CellMesh(FixedInputs):
     """Cells of the regular triangulation of a packing: tetrahedra, wedges and hexahedra that fill the box.
 
@@ -63,6 +70,9 @@ class CellMesh(FixedInputs):
     InputError
         If the packing is not fit for use (see `Packing.validate`), or has no box.
     """
+
+    # Whether rows of cells, spheres and pores include images of others (`porefv.mesh.PeriodicMesh`).
+    periodic = False
 
     def __init__(self, packing: Packing, box: Box | None = None, *, wall_tolerance: float = 0.05):
         if box is not None:
@@ -224,3 +234,9 @@ class CellMesh(FixedInputs):
 
     def __repr__(self) -> str:
         return f"CellMesh({self.n_spheres} spheres, {self.n_cells} cells, box {self.box.sides})"
+
+
+def ensure_walls(mesh: CellMesh) -> None:
+    """InputError if a mesh is periodic: for what needs walls, or takes every row for a cell or pore of its own."""
+    if mesh.periodic:
+        raise InputError(NO_WALLS)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, NoReturn
-
 import numpy as np
 
 from porefv.errors import InputError, counted
-from porefv.mesh.cell_mesh import WallFaces
+from porefv.mesh.cell_mesh import NO_WALLS, WallFaces
 from porefv.mesh.facet_kernels import FacetTopology
 from porefv.mesh.facets import Facets
 from porefv.mesh.inscribed_spheres import InscribedSpheres
@@ -23,13 +20,6 @@ from porefv.system.html_table import html_table
 from porefv.system.lazy import lazy_property
 from porefv.tessellation.torus import TorusTriangulation
 from porefv.tessellation.vertices import Vertices
-
-if TYPE_CHECKING:
-    import meshio
-    import pyvista
-
-    from porefv.export.picture_output import Picture
-    from porefv.fipy.fluid_mesh import FluidMesh
 
 
 class PeriodicFacets(Facets):
@@ -84,9 +74,7 @@ class PeriodicMesh(PoreMesh):
     @property
     def box(self) -> Box:  # type: ignore[override]
         """A periodic mesh has none: an InputError."""
-        raise InputError(
-            "a periodic mesh has no box and no walls: use PeriodicFlow for its flow, or PoreMesh for a packing in a box"
-        )
+        raise InputError(NO_WALLS)
 
     # ---- topology ---------------------------------------------------------------------------------------------
 
@@ -109,7 +97,7 @@ class PeriodicMesh(PoreMesh):
 
     @property
     def vectors(self) -> np.ndarray:
-        """(3, 3): the lattice vectors that steps count, short ones of the same lattice as the cell's, a row each [m]."""
+        """(3, 3): the lattice vectors that steps count, a row each: short ones of the cell's lattice [m]."""
         return self.triangulation.vectors
 
     @property
@@ -213,31 +201,11 @@ class PeriodicMesh(PoreMesh):
     @property
     def inscribed_spheres(self) -> InscribedSpheres:  # type: ignore[override]
         """Not there for periodic meshes: an InputError."""
-        _refuse("inscribed spheres of pores")
+        raise InputError(NO_WALLS)
 
     def cell_volume_rates(self, velocities: np.ndarray, wall_speeds: np.ndarray) -> np.ndarray:
         """Not there for periodic meshes: an InputError."""
-        _refuse("rates of volumes where spheres move")
-
-    def to_meshio(self, **cell_data: Any) -> meshio.Mesh:
-        """Not there for periodic meshes: an InputError."""
-        _refuse("meshes for meshio")
-
-    def to_pyvista(self, **cell_data: Any) -> pyvista.UnstructuredGrid:
-        """Not there for periodic meshes: an InputError."""
-        _refuse("meshes for PyVista")
-
-    def to_fipy(self, without: Collection[str] = ()) -> FluidMesh:
-        """Not there for periodic meshes: an InputError."""
-        _refuse("meshes for FiPy")
-
-    def to_openpnm(self) -> dict[str, np.ndarray]:
-        """Not there for periodic meshes: an InputError."""
-        _refuse("networks for OpenPNM")
-
-    def plot(self, what: str = "section", **options: Any) -> Picture:
-        """Not there for periodic meshes: an InputError."""
-        _refuse("pictures")
+        raise InputError(NO_WALLS)
 
     def _repr_html_(self) -> str:
         rows = [
@@ -254,7 +222,3 @@ class PeriodicMesh(PoreMesh):
             f"PeriodicMesh({counted(self.n_spheres, 'sphere')}, {counted(self.n_pores, 'pore')}, "
             f"{counted(len(self.throats), 'throat')}, cell {self.periodic_cell.sides})"
         )
-
-
-def _refuse(what: str) -> NoReturn:
-    raise InputError(f"porefv has no {what} of a periodic cell: put the packing in a box with walls for them")

@@ -7,12 +7,10 @@ and on edges of the box, and corners of the box: one node for all cells that hav
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.cell_mesh import CellMesh, ensure_walls
 
 TETRA, WEDGE, HEXAHEDRON = 10, 13, 12  # VTK's cell types
 
@@ -57,6 +55,7 @@ class Polyhedra:
 
 def polyhedra(mesh: CellMesh) -> Polyhedra:
     """The cells of a mesh as VTK's: tetrahedra, wedges (3 spheres, a wall), hexahedra (2 and 2, 1 and 3)."""
+    ensure_walls(mesh)
     n = mesh.n_spheres
     n_walls = np.count_nonzero(mesh.cells >= n, axis=1)
     types = np.array([TETRA, WEDGE, HEXAHEDRON, HEXAHEDRON], np.uint8)[n_walls]

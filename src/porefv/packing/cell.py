@@ -97,7 +97,7 @@ class Cell:
 
     @cached_property
     def shortest(self) -> float:
-        """Length of the shortest sum of whole numbers of the vectors, zero excepted: how near a sphere's image is, m."""
+        """How near the next image of a point is: length of the shortest sum of whole numbers of the vectors, m."""
         reduced = reduced_basis(self.vectors)
         steps = np.array([step for step in product((-1, 0, 1), repeat=3) if any(step)])
         return float(np.linalg.norm(steps @ reduced, axis=1).min())

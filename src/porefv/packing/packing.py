@@ -1,4 +1,4 @@
-"""Packing: spheres in a box with six walls or in a periodic cell; what they fill, where they overlap, whether they fit."""
+"""Packing: spheres in a box or in a periodic cell; what they fill, where they overlap, and whether they fit."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ class Packing:
         return replace(self, centres=self.centres * factor, radii=self.radii * factor, box=box)
 
     def cropped(self, box: Box) -> Packing:
-        """The spheres whose centres lie in a box, in that box.
+        """The spheres whose centres lie in a box, in that box; of a packing in a periodic cell, all their images.
 
         Spheres that reach beyond its walls are cut by them: the part inside stays. Such a packing needs a
         `wall_tolerance` of the mesh that is large enough; 1 is for any crop. Of spheres whose centres are outside, the
@@ -187,6 +187,8 @@ class Packing:
         InputError
             If no centre is in the box.
         """
+        if isinstance(self.box, Cell):
+            return self._images_around(box, self.box).cropped(box)
         distances = box.wall_distances(self.centres)
         inside = (distances > 0.0).all(axis=1)
         if not inside.any():
@@ -194,6 +196,19 @@ class Packing:
         lost = int(np.count_nonzero(~inside & (distances > -self.radii[:, None]).all(axis=1)))
         metadata = self.metadata | ({"caps_lost": str(lost)} if lost else {})
         return Packing(self.centres[inside], self.radii[inside], box, metadata=metadata)
+
+    def _images_around(self, box: Box, cell: Cell) -> Packing:
+        """All images of the spheres of a periodic cell in a box and around it."""
+        reach = self.radii.max()
+        corners = np.stack(np.meshgrid(*zip(box.lower - reach, box.upper + reach, strict=True)), axis=-1).reshape(-1, 3)
+        steps = cell.steps(corners)
+        ranges = [np.arange(least, most + 1) for least, most in zip(steps.min(axis=0), steps.max(axis=0), strict=True)]
+        moves = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3) @ cell.vectors
+        points = (cell.wrapped(self.centres)[:, None] + moves).reshape(-1, 3)
+        near = ((points > box.lower - reach) & (points < box.upper + reach)).all(axis=1)
+        if not near.any():
+            raise InputError(f"{self._path()}no centre lies in the box {vector(box.lower)} to {vector(box.upper)}.")
+        return Packing(points[near], np.repeat(self.radii, len(moves))[near], metadata=self.metadata)
 
     @property
     def bounding_box(self) -> Box:

@@ -208,15 +208,16 @@ class Solver:
         if not reached <= tolerance:
             if _driven(network, network.leaks * held + sources):
                 raise ComputationError(
-                    f"the {name} solver stopped at a flux imbalance of {reached:.1e} after {found.iterations} iterations "
-                    f"(asked: {tolerance:.1e}): conductances differ by too many decades, leave out spheres that are much "
-                    "smaller than the rest; or try another solver, or a larger tolerance"
+                    f"the {name} solver stopped at a flux imbalance of {reached:.1e} after {found.iterations} "
+                    f"iterations (asked: {tolerance:.1e}): conductances differ by too many decades, leave out spheres "
+                    "that are much smaller than the rest; or try another solver, or a larger tolerance"
                 )
             reached = 0.0  # equal pressures: nothing flows but what rounding makes
         if not found.error <= accuracy:
             raise ComputationError(
-                f"pressures are uncertain by {found.error / span:.1e} of their range: some pores are joined to the rest by "
-                "conductances too many decades below their own; leave out spheres that are much smaller than the rest"
+                f"pressures are uncertain by {found.error / span:.1e} of their range: some pores are joined to the "
+                "rest by conductances too many decades below their own; leave out spheres that are much smaller than "
+                "the rest"
             )
         error = found.error / span if span > 0.0 else float("nan")
         seconds = time.perf_counter() - begin

@@ -5,8 +5,8 @@ of the periodic one if no image of a sphere is in conflict with it, and an image
 centre P, R² = ρ² + r_max² (as in `porefv.tessellation.blocks`). Where the balls of all cells at the spheres themselves
 lie within the space that holds all images, these cells are certain; where one does not, more images are taken.
 
-Of all repetitions of a cell one is kept: that whose first vertex, in the order of spheres and then of their steps, is in
-the periodic cell itself. The perturbation that decides ties is the same for all repetitions, because it depends on
+Of all repetitions of a cell one is kept: that whose first vertex, in the order of spheres and then of their steps, is
+inside the periodic cell. The perturbation that decides ties is the same for all repetitions, because it depends on
 differences of centres alone. Images must be exact translates of their spheres for that: centres and vectors are rounded
 to multiples of one power of two, so fine that they move by less than 1e-15 of the cell, and so coarse that sums and
 differences of all images are exact.
@@ -132,7 +132,7 @@ class TorusTriangulation:
 
 
 def _on_a_grid(local: np.ndarray, vectors: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Short lattice vectors (3, 3) and the points (n, 3) within their parallelepiped, on a grid of a power of two [m]."""
+    """Short lattice vectors (3, 3), and points (n, 3) in their parallelepiped, as multiples of a power of two [m]."""
     layers = 2.0 + reach / faces_of(reduced_basis(vectors)).heights
     farthest = float((np.abs(reduced_basis(vectors)) * layers[:, None]).sum(axis=0).max())
     grid = 2.0 ** (np.ceil(np.log2(4.0 * farthest)) - 52.0)

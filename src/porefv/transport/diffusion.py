@@ -11,6 +11,7 @@ from porefv.conductance.conductances import check_conductances, ensure_pore_mesh
 from porefv.conductance.prism_sections import diffusive_conductances
 from porefv.errors import InputError
 from porefv.flow.flux import net_outflows
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.pressure_equation import reached, solve_network
 from porefv.solvers.solver import TOLERANCE
@@ -91,6 +92,7 @@ def effective_diffusion(
     (0.377, 2.65, 1.26)
     """
     ensure_pore_mesh(mesh)
+    ensure_walls(mesh)
     if axis not in ("x", "y", "z"):
         raise InputError(f"axis must be 'x', 'y' or 'z', not {axis!r}")
     number = "xyz".index(axis)
