@@ -19,7 +19,9 @@ def test_a_cell_knows_its_volume_and_sides():
     cell = Cell(SHEARED, [1, 2, 3])
     assert cell.volume == pytest.approx(1.1, rel=1e-14)
     assert repr(Cell([1, 2, 1])) == "Cell(1×2×1 m)"
-    assert repr(cell).startswith("Cell(1×1.04403×1.1225 m, vectors (1, 0, 0), (0.3, 1, 0), (-0.1, 0.2, 1.1), origin (1,")
+    assert repr(cell).startswith(
+        "Cell(1×1.04403×1.1225 m, vectors (1, 0, 0), (0.3, 1, 0), (-0.1, 0.2, 1.1), origin (1,"
+    )
     assert_array_equal(Cell.of(Box([1, 1, 1], [2, 3, 4])).vectors, np.diag([1, 2, 3]))
 
 

@@ -20,6 +20,6 @@ from porefv.flow.walls import Wall, Walls
 __all__ = [
     "ConstrictionSizes", "DirectionalPermeabilities", "Distribution", "FixedPressure", "FlowAtWalls", "FlowSource",
     "Fluid", "Forces", "Paths", "PeriodicFlow", "Point", "PoreFlow", "PoreSizes", "PressureField", "Profile",
-    "SolidPressureWeights", "Sphere", "Wall", "Walls", "acting_pressure", "directional_permeabilities", "fluxes", "grain_forces",
-    "pore_velocities", "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
+    "SolidPressureWeights", "Sphere", "Wall", "Walls", "acting_pressure", "directional_permeabilities", "fluxes",
+    "grain_forces", "pore_velocities", "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
 ]  # fmt: skip

@@ -77,10 +77,12 @@ def solve_gradients(
     ready = Solver(network, solver, many=True)
     pressures, drops, reports = np.zeros((3, n)), np.empty((3, len(pairs))), []
     i, j = pairs.T
+    size = float(np.abs(mesh.vectors).max())
     for axis in range(3):
         crossing = links * steps[:, axis]
         sources = np.bincount(j, crossing, n) - np.bincount(i, crossing, n)
-        found = ready.solve_split(np.zeros(len(network)), sources[free], tolerance)
+        # A unit gradient makes a pressure of the order of the cell's size.
+        found = ready.solve_split(np.zeros(len(network)), sources[free], tolerance, drive=size)
         rest = np.zeros(n)
         pressures[axis, free], rest[free] = found.pressure, found.rest
         drops[axis] = (pressures[axis, i] - pressures[axis, j]) + (rest[i] - rest[j]) + steps[:, axis]

@@ -159,7 +159,9 @@ class Solver:
             )
         return x, report
 
-    def solve_split(self, held: np.ndarray, sources: np.ndarray, tolerance: float = TOLERANCE) -> SplitSolution:
+    def solve_split(
+        self, held: np.ndarray, sources: np.ndarray, tolerance: float = TOLERANCE, drive: float | None = None
+    ) -> SplitSolution:
         """Solve A x = leaks held + sources to the tolerance, however far apart conductances are.
 
         Where rounding of its factor leaves `direct` short of that, `auto` goes on with `cg`.
@@ -172,6 +174,9 @@ class Solver:
             Volume injected into each node per unit time [m³/s].
         tolerance : float
             See `solve`.
+        drive : float, optional
+            What the error of pressures is measured against; by default the range of the held ones, where nothing else
+            drives the flow [Pa].
 
         Raises
         ------
@@ -188,7 +193,9 @@ class Solver:
             pressure = np.full(n, values[0] if n else 0.0)
             report = SolverReport(self.name, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin, 0.0)
             return SplitSolution(pressure, np.zeros(n), report)
-        accuracy = max(PRESSURE_TOLERANCE, tolerance) * span if span > 0.0 and not sources.any() else np.inf
+        if drive is None:
+            drive = span if span > 0.0 and not sources.any() else np.inf
+        accuracy = max(PRESSURE_TOLERANCE, tolerance) * drive
         found = None
         for ready in (self,) if self._fallback is None else (self, self._fallback):
             name = ready.name
@@ -215,11 +222,11 @@ class Solver:
             reached = 0.0  # equal pressures: nothing flows but what rounding makes
         if not found.error <= accuracy:
             raise ComputationError(
-                f"pressures are uncertain by {found.error / span:.1e} of their range: some pores are joined to the "
+                f"pressures are uncertain by {found.error / drive:.1e} of their range: some pores are joined to the "
                 "rest by conductances too many decades below their own; leave out spheres that are much smaller than "
                 "the rest"
             )
-        error = found.error / span if span > 0.0 else float("nan")
+        error = found.error / drive if np.isfinite(drive) else found.error / span if span > 0.0 else float("nan")
         seconds = time.perf_counter() - begin
         report = SolverReport(name, n, found.iterations, tolerance, reached, 0.0, seconds, error)
         return SplitSolution(found.x, found.rest, report)
