@@ -72,7 +72,8 @@ def solve_gradients(
     # A throat from a pore to an image of itself has the same flux into it and out of it.
     links = np.where(pairs[:, 0] == pairs[:, 1], 0.0, conductances)
     parts = joined_parts(pairs, links, n)
-    free = parts != np.arange(n)  # each part is held at its first pore
+    free = np.ones(n, bool)
+    free[_best_joined(parts, pairs, links)] = False
     network, _ = free_network(pairs, links, np.zeros(n), free, np.zeros(n))
     ready = Solver(network, solver, many=True)
     pressures, drops, reports = np.zeros((3, n)), np.empty((3, len(pairs))), []
@@ -97,6 +98,14 @@ def solve_gradients(
     periodic = pressures + (mesh.pore_centres - mesh.triangulation.origin - middle).T
     pressures -= (periodic @ volumes / volumes.sum())[:, None]
     return GradientSolutions(pressures, drops, parts, tuple(reports))
+
+
+def _best_joined(parts: np.ndarray, pairs: np.ndarray, conductances: np.ndarray) -> np.ndarray:
+    """The pore of each part whose throats conduct most: all others' pressures follow well from that of this one."""
+    totals = np.bincount(pairs.ravel(), np.repeat(conductances, 2), len(parts))
+    order = np.lexsort((-totals, parts))
+    _, first = np.unique(parts[order], return_index=True)
+    return order[first]
 
 
 def _levels(pairs: np.ndarray, areas: np.ndarray, drops: np.ndarray, parts: np.ndarray, tolerance: float) -> np.ndarray:
