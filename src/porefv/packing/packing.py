@@ -136,7 +136,7 @@ class Packing:
         cls,
         path: str | PathLike[str],
         format: str | None = None,
-        box: Box | None = None,
+        box: Box | Cell | None = None,
         *,
         columns: Mapping[str, str] | None = None,
         radius: float | None = None,
