@@ -81,7 +81,8 @@ class Cell:
     def volume(self) -> float:
         """Volume, m³."""
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            return float(abs(np.linalg.det(self.vectors)))
+            a, b, c = self.vectors
+            return float(abs(a @ np.cross(b, c)))
 
     def scaled(self, factor: float) -> Cell:
         """The cell with all lengths multiplied by a factor."""
