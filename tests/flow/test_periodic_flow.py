@@ -137,6 +137,10 @@ def test_random_cells_conserve_flow_and_force(case):
     flux, pores = flow.flux(gradient), mesh.pore_owners.rows[mesh.throats.pores]
     net = np.bincount(pores[:, 0], flux, mesh.n_pores) - np.bincount(pores[:, 1], flux, mesh.n_pores)
     assert np.abs(net).sum() <= 1e-9 * np.abs(flux).sum()
+    velocities = flow.pore_velocity(gradient) * np.maximum(mesh.pore_volumes, 0.0)[:, None]
+    if (mesh.pore_volumes > 0.0).all():
+        mean = flow.darcy_velocity(gradient) * packing.box.volume
+        assert_allclose(velocities.sum(axis=0), mean, atol=1e-9 * np.abs(flux).sum() * np.cbrt(packing.box.volume))
     # The flux of a throat is that of the pressures of its pores, an image's lower or higher by the mean gradient.
     _, steps = mesh.pore_owners
     pressure = flow.pressure(gradient)[mesh.pore_owners.rows] + steps @ mesh.vectors @ gradient

@@ -31,9 +31,7 @@ def pore_velocities(
     (n_pores, 3) array [m/s]; zero for pores without volume.
     """
     ensure_walls(mesh)
-    throats = mesh.throats
-    centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]
-    centres /= np.maximum(throats.areas, np.finfo(float).tiny)[:, None]
+    throats, centres = mesh.throats, throat_centroids(mesh)
     i, j = throats.pores.T
     faces = mesh.wall_faces
     pores = mesh.cell_pore[faces.cells]
@@ -52,6 +50,13 @@ def pore_velocities(
             )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)
+
+
+def throat_centroids(mesh: PoreMesh) -> np.ndarray:
+    """(t, 3): centroid of the facets of each throat, from the mesh's local origin [m]."""
+    throats = mesh.throats
+    centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]
+    return centres / np.maximum(throats.areas, np.finfo(float).tiny)[:, None]
 
 
 def _by_pore(mesh: PoreMesh, values: np.ndarray) -> np.ndarray:
