@@ -13,7 +13,7 @@ from porefv.conductance.registry import AUTO
 from porefv.errors import InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.forces import Forces, scatter_forces, unit_forces
-from porefv.flow.periodic_pressure import GradientSolutions, solve_gradients, throat_steps
+from porefv.flow.periodic_pressure import GradientSolutions, mean_conductivity, solve_gradients, throat_steps
 from porefv.flow.pressure_on_grains import ACTING
 from porefv.flow.velocity import throat_centroids
 from porefv.mesh.periodic_mesh import PeriodicMesh
@@ -101,9 +101,8 @@ class PeriodicFlow(FixedInputs):
         It is that of the power that the flow takes up, k_ab = μ Σ K d_a d_b / V over all throats, with d_a the drop
         along a throat where the pressure falls by 1 Pa/m along a.
         """
-        drops, volume = self.solutions.drops, self.mesh.periodic_cell.volume
-        tensor = self.fluid.viscosity * ((drops * self.conductances) @ drops.T) / volume
-        return ensure_finite(0.5 * (tensor + tensor.T), "permeabilities")
+        tensor = mean_conductivity(self.mesh, self.conductances, self.solutions.drops)
+        return ensure_finite(self.fluid.viscosity * tensor, "permeabilities")
 
     @lazy_property
     def permeability_by_flux(self) -> np.ndarray:

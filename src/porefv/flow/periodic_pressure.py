@@ -35,6 +35,12 @@ class GradientSolutions:
     reports: tuple[SolverReport, ...]
 
 
+def mean_conductivity(mesh: PeriodicMesh, conductances: np.ndarray, drops: np.ndarray) -> np.ndarray:
+    """(3, 3): tensor Σ K d_a d_b / V, flow through a unit of area for a unit gradient, from the drops (3, t)."""
+    tensor = (drops * conductances) @ drops.T / mesh.periodic_cell.volume
+    return 0.5 * (tensor + tensor.T)
+
+
 def throat_steps(mesh: PeriodicMesh) -> tuple[np.ndarray, np.ndarray]:
     """Pores (t, 2) of the period that throats join, and the vector (t, 3) to the image that is the second [m]."""
     pores, steps = mesh.pore_owners
