@@ -56,7 +56,7 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
     cells = vtk.vtkCellArray()
     cells.SetData(vtk_array(solids.offsets), vtk_array(solids.connectivity))
     grid.SetCells(vtk_array(solids.types), cells)
-    data = {"pore": mesh.cell_pore} if isinstance(mesh, PoreMesh) else {}
+    data = {"pore": mesh.cell_pore[: mesh.n_cells]} if isinstance(mesh, PoreMesh) else {}
     for name, values in cell_data.items():
         data[name] = values_by_cell(mesh, name, np.asarray(values))
     attach(grid.GetCellData(), data, mesh.n_cells)
