@@ -17,6 +17,9 @@ from porefv.mesh.uniting import join_with_steps
 from porefv.tessellation.torus import OTHERS, TorusTriangulation
 from porefv.tessellation.vertices import Vertices
 
+# Cells whose corners are in memory at a time.
+_BLOCK = 1 << 16
+
 
 class Owners(NamedTuple):
     """What each row repeats.
@@ -63,11 +66,13 @@ class TorusRows(NamedTuple):
 def settled_vertices(torus: TorusTriangulation, radii: np.ndarray) -> np.ndarray:
     """(m, 3): Laguerre vertices, those of flat cells as the nearest of their neighbours' (see `settle_flat_cells`)."""
     vertices = torus.local_vertices.copy()
-    corners = torus.points[torus.cells] + torus.steps @ torus.vectors
-    one_cell_each = np.arange(4 * len(corners), dtype=np.int32).reshape(-1, 4)
-    points = corners.reshape(-1, 3)
-    flat = np.empty(len(corners), bool)
-    flat_cells(one_cell_each, Vertices(len(points), points, radii[torus.cells].ravel()), flat)
+    flat = np.empty(len(vertices), bool)
+    for begin in range(0, len(flat), _BLOCK):
+        cells, steps = torus.cells[begin : begin + _BLOCK], torus.steps[begin : begin + _BLOCK]
+        points = (torus.points[cells] + steps @ torus.vectors).reshape(-1, 3)
+        one_cell_each = np.arange(len(points), dtype=np.int32).reshape(-1, 4)
+        corners = Vertices(len(points), points, radii[cells].ravel())
+        flat_cells(one_cell_each, corners, flat[begin : begin + _BLOCK])
     while True:
         rows = np.flatnonzero(flat)
         beside = torus.neighbours[rows]
@@ -146,7 +151,7 @@ def torus_rows(torus: TorusTriangulation, vertices: np.ndarray, nodes: United, p
         Cells that share a Laguerre vertex, and those that are one pore.
     """
     m = len(vertices)
-    numbers, moved = pores
+    numbers, moved = pores.labels, pores.steps.astype(np.int16)
     # All cells of a pore are put beside one another, and keep their neighbours.
     vertices = vertices + moved @ torus.vectors
     corner_steps = torus.steps + moved[:, None]
@@ -157,8 +162,7 @@ def torus_rows(torus: TorusTriangulation, vertices: np.ndarray, nodes: United, p
     # kept in one frame, and agree on the rows of what is around them.
     first, second = np.broadcast_to(numbers[:, None], (m, 4)), numbers[torus.neighbours]
     across = jumps.any(axis=2)
-    sign = np.sign(jumps)
-    positive = (sign @ np.array([4, 2, 1])) > 0
+    positive = np.sign(jumps) @ np.array([4, 2, 1], np.int16) > 0
     kept = across & ((first < second) | ((first == second) & positive))
     n_pores = int(numbers.max()) + 1
     images, ghost = np.unique(np.column_stack([second[kept], jumps[kept]]), axis=0, return_inverse=True)

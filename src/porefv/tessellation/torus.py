@@ -53,11 +53,11 @@ class TorusTriangulation:
         The image of each sphere in the parallelepiped of these vectors, from the origin [m].
     cells : (m, 4) int32 array
         Spheres of each cell, positively oriented.
-    steps : (m, 4, 3) int array
+    steps : (m, 4, 3) int16 array
         Steps from each of these spheres to its image that is the cell's vertex.
     neighbours : (m, 4) int32 array
         Cell across the facet opposite to each vertex.
-    neighbour_steps : (m, 4, 3) int array
+    neighbour_steps : (m, 4, 3) int16 array
         Steps from that cell to its image that is the neighbour.
     local_vertices : (m, 3) array
         Laguerre vertex (power centre) of each cell, from the origin [m].
@@ -99,11 +99,11 @@ class TorusTriangulation:
         number = np.full(len(found.cells) + 1, -1, np.int32)
         number[own] = np.arange(len(own))
         cells = found.cells[own]
-        self.cells = images.spheres[cells].astype(np.int32)
-        self.steps = images.steps[cells]
+        self.cells = images.spheres.astype(np.int32)[cells]
+        self.steps = images.steps.astype(np.int16)[cells]
         self.local_vertices = found.local_vertices[own] + found.origin
         self.neighbours = number[found.neighbours[own]]
-        self.neighbour_steps = np.zeros((len(own), 4, 3), np.int64)
+        self.neighbour_steps = np.zeros((len(own), 4, 3), np.int16)
         # Facets that are those of images of other cells occur twice, once from each side, but for steps.
         cell, place = np.nonzero(self.neighbours < 0)
         rows = np.sort(cells[cell[:, None], OTHERS[place]], axis=1)
