@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from porefv.flow.flux import fluxes
     from porefv.flow.forces import Forces, grain_forces
     from porefv.flow.inside import FixedPressure, FlowSource
+    from porefv.flow.periodic_flow import PeriodicFlow
     from porefv.flow.pore_flow import PoreFlow
     from porefv.flow.pressure import PressureField, solve_pressure
     from porefv.flow.pressure_on_grains import acting_pressure
@@ -54,14 +55,17 @@ if TYPE_CHECKING:
     from porefv.flow.walls import Wall, Walls
     from porefv.mesh.cell_mesh import CellMesh
     from porefv.mesh.facets import Facets
+    from porefv.mesh.periodic_mesh import PeriodicMesh
     from porefv.mesh.pore_mesh import PoreMesh
     from porefv.mesh.throats import Throats
     from porefv.packing.box import WALLS, Box
+    from porefv.packing.cell import Cell
     from porefv.packing.packing import Packing
     from porefv.tessellation.triangulation import RegularTriangulation
 
 _HOMES = {
     "Box": "porefv.packing.box",
+    "Cell": "porefv.packing.cell",
     "CellMesh": "porefv.mesh.cell_mesh",
     "ComputationError": "porefv.errors",
     "ConductanceModel": "porefv.conductance.model",
@@ -74,6 +78,8 @@ _HOMES = {
     "HydraulicRadius": "porefv.conductance.hydraulic_radius",
     "InputError": "porefv.errors",
     "Packing": "porefv.packing.packing",
+    "PeriodicFlow": "porefv.flow.periodic_flow",
+    "PeriodicMesh": "porefv.mesh.periodic_mesh",
     "Point": "porefv.flow.regions",
     "PoreFlow": "porefv.flow.pore_flow",
     "PoreMesh": "porefv.mesh.pore_mesh",
@@ -96,6 +102,7 @@ _HOMES = {
 __all__ = [
     "WALLS",
     "Box",
+    "Cell",
     "CellMesh",
     "ComputationError",
     "ConductanceModel",
@@ -108,6 +115,8 @@ __all__ = [
     "HydraulicRadius",
     "InputError",
     "Packing",
+    "PeriodicFlow",
+    "PeriodicMesh",
     "Point",
     "PoreFlow",
     "PoreMesh",

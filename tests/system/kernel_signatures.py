@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from porefv import HydraulicRadius, Packing, PoreFlow, PoreMesh, Walls
+from porefv import Cell, HydraulicRadius, Packing, PeriodicFlow, PoreFlow, PoreMesh, Walls
 from porefv.cli import main as porefv
 from porefv.coupling.micromechanics import cell_strains
 from porefv.dem.dem import DEM
@@ -104,6 +104,11 @@ def run_everything(folder: Path) -> None:
         for model in (None, HydraulicRadius()):
             flow = PoreFlow(made, Walls.along("y", slip=True), conductance=model)
             flow.forces, flow.pore_velocity, flow.to_fipy().mesh
+    for factor, model, solver in ((0.8, None, "direct"), (1.25, HydraulicRadius(), "cg")):
+        periodic = PeriodicFlow(
+            Packing(packing.centres, factor * packing.radii, Cell([1, 1, 1])), conductance=model, solver=solver
+        )
+        periodic.forces([1, 0, 0]), periodic.mesh.laguerre_volumes, periodic.mesh.cell_surfaces, periodic.porosity
     Solute(flow).advance(1.0)
     implicit.FACTOR_LIMIT = 0  # as if there were many pores
     Solute(flow, 1e-3).advance(1.0)

@@ -6,10 +6,12 @@ from numpy.testing import assert_allclose
 
 from porefv.conductance.prism_sections import diffusive_conductances
 from porefv.errors import InputError
+from porefv.mesh.periodic_mesh import PeriodicMesh
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import Box
+from porefv.packing.cell import Cell
 from porefv.packing.packing import Packing
-from porefv.transport.diffusion import effective_diffusion
+from porefv.transport.diffusion import effective_diffusion, periodic_diffusivity
 
 UNIT = Box([0, 0, 0], [1, 1, 1])
 # Octants of the unit cells of cubic lattices, in edges: centres, and the radius of touching spheres.
@@ -129,3 +131,20 @@ def test_it_is_in_proportion_to_given_conductances(mesh_of):
     found = effective_diffusion(mesh, "x")
     doubled = effective_diffusion(mesh, "x", conductances=2.0 * diffusive_conductances(mesh.throats))
     assert_allclose(doubled.relative_diffusivity, 2.0 * found.relative_diffusivity, rtol=1e-9)
+
+
+def test_in_a_periodic_cell_points_leave_the_diffusivity_of_the_fluid():
+    vectors = np.array([[1.0, 0.0, 0.0], [0.4, 1.0, 0.0], [-0.2, 0.3, 0.8]])
+    places = np.random.default_rng(0).uniform(0, 1, (60, 3)) @ vectors
+    points = PeriodicMesh(Packing(places, np.full(60, 1e-7), Cell(vectors)), unite_tolerance=0.0)
+    assert_allclose(periodic_diffusivity(points), np.eye(3), atol=1e-5)
+
+
+@pytest.mark.parametrize("radius", [0.5, 0.4])
+def test_a_periodic_lattice_has_the_diffusivity_of_the_box_around_its_sphere(radius):
+    packing = Packing([[0.5, 0.5, 0.5]], [radius], UNIT)
+    walled = effective_diffusion(PoreMesh(packing), "x").relative_diffusivity
+    periodic = periodic_diffusivity(PeriodicMesh(packing.with_box(Cell([1, 1, 1]))))
+    assert_allclose(periodic, walled * np.eye(3), atol=1e-12)
+    with pytest.raises(InputError, match="mesh must be a PeriodicMesh; for a packing in a box"):
+        periodic_diffusivity(PoreMesh(packing))

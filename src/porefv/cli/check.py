@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
         from porefv.packing.packing import Packing
 
         packing = Packing.read(options.scene)
-        if packing.box is not None:
+        if packing.walled_box is not None:
             packing.validate()
         say(f"{packing_text(packing, options.scene)}\nno errors")
         return
@@ -74,7 +74,7 @@ def scene_text(scene: FlowScene, packing: Packing) -> str:
     from porefv.system.memory import available
 
     overlaps = packing.overlaps
-    box = packing.box
+    box = packing.walled_box
     assert box is not None  # the scene has seen to it
     walls = {name: vars(wall) for name, wall in zip(WALLS, scene.walls, strict=True)}
     fluid, flow, output = scene.fluid, scene.flow, scene.output

@@ -25,7 +25,7 @@ def packing_text(packing: Packing, path: Path) -> str:
     from porefv.packing.free_space import wall_layers
     from porefv.packing.neighbours import neighbour_pairs
 
-    radii, box = packing.radii, packing.box
+    radii, box = packing.radii, packing.walled_box
     pairs = neighbour_pairs(packing.centres, radii, _CONTACT * float(radii.min()))
     overlapping = len(packing.overlaps.pairs)
     around = packing.bounding_box

@@ -98,8 +98,8 @@ class CouplingState:
         scheme, drag_number
             As the attributes of the class.
         """
-        assert packing.box is not None  # a mesh has seen to it
-        corners = np.stack([packing.box.lower, packing.box.upper])
+        assert packing.walled_box is not None  # a mesh has seen to it
+        corners = np.stack([packing.walled_box.lower, packing.walled_box.upper])
         pressure, rate = np.zeros((2, free))
         return cls(
             packing.centres, packing.radii, corners, scheme, drag_number, pressure, rate, np.zeros((2, 0)), True,

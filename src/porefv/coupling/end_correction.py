@@ -84,8 +84,8 @@ def reached_walls(packing: Packing) -> np.ndarray:
 
     The porosity of the layer two mean diameters thick along such a wall is at most 0.15 above that between the taps.
     """
-    assert packing.box is not None  # a mesh has seen to it
-    box, reached = packing.box, np.zeros(6, bool)
+    assert packing.walled_box is not None  # a mesh has seen to it
+    box, reached = packing.walled_box, np.zeros(6, bool)
     thick = 2.0 * _LAYER * float(packing.radii.mean())
     for axis in range(3):
         lower, size = box.lower[axis], box.size[axis]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from porefv.errors import InputError
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.facet_kernels import area_vector, spheres_first
 from porefv.mesh.vectors import wall_distance
 from porefv.packing.box import WALL_AXES
@@ -174,6 +175,7 @@ def _strains(gradients: np.ndarray) -> np.ndarray:
 
 def _integrals(mesh: PoreMesh, displacements: ArrayLike, wall_displacements: ArrayLike) -> np.ndarray:
     """(m, 3, 3): ∮ u ⊗ n dS over each cell [m³]."""
+    ensure_walls(mesh)
     u, walls = np.array(displacements, float), np.array(wall_displacements, float)
     for moves, shape, what in (
         (u, (mesh.n_spheres, 3), "displacements, one row per grain"),

@@ -82,7 +82,7 @@ class DEM:
         check_number(damping, "damping", "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
         self.damping = float(damping)
         _check_grains(packing)
-        assert packing.box is not None  # _check_grains has seen to it
+        assert packing.walled_box is not None  # _check_grains has seen to it
 
         self.state = GrainState.of(packing)
         self._make_room()
@@ -570,9 +570,9 @@ class DEM:
 
 def _check_grains(packing: Packing) -> None:
     """Grains must have a box, their centres in it, and none of their centres inside another grain."""
-    if packing.box is None:
+    if packing.walled_box is None:
         raise InputError("the packing has no box; give it one: its walls hold the grains")
-    outside = ((packing.centres <= packing.box.lower) | (packing.centres >= packing.box.upper)).any(axis=1)
+    outside = (packing.walled_box.wall_distances(packing.centres) <= 0.0).any(axis=1)
     if outside.any():
         grain = int(np.argmax(outside))
         raise InputError(f"grain {grain} has its centre outside the box; move it, or enlarge the box")

@@ -187,7 +187,7 @@ class GrainState:
     @classmethod
     def of(cls, packing: Packing) -> GrainState:
         """Grains at rest at time 0, in the box of a packing; masses, stiffnesses and pairs are still to be found."""
-        assert packing.box is not None  # a DEM has seen to it
+        assert packing.walled_box is not None  # a DEM has seen to it
         n = len(packing)
         order = np.argsort(morton_codes(np.asarray(packing.centres)), kind="stable")
         rank = np.empty(n, np.int64)
@@ -195,7 +195,7 @@ class GrainState:
         motion = np.zeros((n, 10))
         motion[:, :3] = packing.centres[order]
         motion[:, 3] = packing.radii[order]
-        places = packing.box.wall_places
+        places = packing.walled_box.wall_places
         none, nothing, not_one = np.zeros((0, 2), np.int32), np.zeros(0), np.zeros(0, bool)
         return cls(
             order=order,

@@ -16,6 +16,6 @@ def values_by_cell(mesh: CellMesh, name: str, values: np.ndarray) -> np.ndarray:
     pores = ""
     if isinstance(mesh, PoreMesh):
         if len(values) == mesh.n_pores:
-            return values[mesh.cell_pore]
+            return values[mesh.cell_pore[: mesh.n_cells]]
         pores = f" or per pore ({mesh.n_pores})"
     raise InputError(f"cell data {name!r} has {len(values)} rows: needed is one per cell ({mesh.n_cells}){pores}")

@@ -8,6 +8,7 @@ import numpy as np
 
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.walls import Walls
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALLS
 from porefv.solvers.pressure_equation import reached
@@ -15,6 +16,7 @@ from porefv.solvers.pressure_equation import reached
 
 def mesh_to_openpnm(mesh: PoreMesh) -> dict[str, np.ndarray]:
     """The pores and throats of a mesh: the part of `openpnm_network` that needs no flow."""
+    ensure_walls(mesh)
     throats = mesh.throats
     return openpnm_network(
         mesh.pore_centres,

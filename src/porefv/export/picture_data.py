@@ -126,7 +126,7 @@ def check_kind(what: str) -> None:
 
 def data_of_packing(packing: Packing, what: str = "packing") -> PictureData:
     """Data of a packing, in its box or, without one, in its bounding box."""
-    box = packing.bounding_box if packing.box is None else packing.box
+    box = packing.bounding_box if packing.walled_box is None else packing.walled_box
     data = PictureData(packing.centres, packing.radii, box, missing=_needs_a_flow)
     return data.with_parts(what, {})
 

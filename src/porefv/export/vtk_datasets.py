@@ -12,7 +12,7 @@ import numpy as np
 from porefv.errors import InputError
 from porefv.export.cell_data import values_by_cell
 from porefv.export.vtk_files import attach, cell_array, vtk_array, vtk_data_model, vtk_points, write_xml
-from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.cell_mesh import CellMesh, ensure_walls
 from porefv.mesh.polyhedra import polyhedra
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.mesh.throats import Throats
@@ -56,7 +56,7 @@ def cells_grid(mesh: CellMesh, **cell_data: Any) -> vtkUnstructuredGrid:
     cells = vtk.vtkCellArray()
     cells.SetData(vtk_array(solids.offsets), vtk_array(solids.connectivity))
     grid.SetCells(vtk_array(solids.types), cells)
-    data = {"pore": mesh.cell_pore} if isinstance(mesh, PoreMesh) else {}
+    data = {"pore": mesh.cell_pore[: mesh.n_cells]} if isinstance(mesh, PoreMesh) else {}
     for name, values in cell_data.items():
         data[name] = values_by_cell(mesh, name, np.asarray(values))
     attach(grid.GetCellData(), data, mesh.n_cells)
@@ -73,8 +73,10 @@ def spheres_polydata(packing: Packing, **point_data: np.ndarray) -> vtkPolyData:
     polydata.SetPoints(vtk_points(packing.centres))
     polydata.SetVerts(cell_array(np.arange(n)[:, None]))
     attach(polydata.GetPointData(), {"id": np.arange(n), "radius": packing.radii, **point_data}, n)
-    if packing.box is not None:
-        attach(polydata.GetFieldData(), {"box_lower": packing.box.lower, "box_upper": packing.box.upper}, 3)
+    if packing.walled_box is not None:
+        attach(
+            polydata.GetFieldData(), {"box_lower": packing.walled_box.lower, "box_upper": packing.walled_box.upper}, 3
+        )
     return polydata
 
 
@@ -86,6 +88,7 @@ def throats_polydata(
     Points are Laguerre vertices, that of a united pore the mean of several. They have the point data `pore` (id),
     `volume` and those given (n_pores rows).
     """
+    ensure_walls(throats.mesh)
     polydata = vtk_data_model().vtkPolyData()
     polydata.SetPoints(vtk_points(throats.mesh.pore_centres))
     polydata.SetLines(cell_array(throats.pores))

@@ -20,6 +20,7 @@ from porefv.fipy.fipy_patches import install
 from porefv.fipy.gradient import LeastSquaresGradient
 from porefv.fipy.pore_solver import Factors, PoreSolver
 from porefv.fipy.term_checks import check_terms
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.polyhedra import polygons
 from porefv.packing.box import WALLS
 
@@ -120,6 +121,7 @@ class FluidMesh(fipy.meshes.mesh.Mesh):  # type: ignore[name-defined]
     """
 
     def __init__(self, pore_mesh: PoreMesh, without: Collection[str] = ()):
+        ensure_walls(pore_mesh)
         install()
         left_out = walls_left_out(without)
         kept = (pore_mesh.pore_walls & sum(1 << wall for wall in left_out)) == 0

@@ -7,6 +7,7 @@ from porefv.flow.forces import Forces, grain_forces
 from porefv.flow.imposed_flow import FlowAtWalls, solve_imposed_flow
 from porefv.flow.inside import FixedPressure, FlowSource
 from porefv.flow.paths import Paths
+from porefv.flow.periodic_flow import PeriodicFlow
 from porefv.flow.pore_flow import PoreFlow
 from porefv.flow.pressure import PressureField, solve_pressure
 from porefv.flow.pressure_on_grains import SolidPressureWeights, acting_pressure, solid_pressure_weights
@@ -18,7 +19,7 @@ from porefv.flow.walls import Wall, Walls
 
 __all__ = [
     "ConstrictionSizes", "DirectionalPermeabilities", "Distribution", "FixedPressure", "FlowAtWalls", "FlowSource",
-    "Fluid", "Forces", "Paths", "Point", "PoreFlow", "PoreSizes", "PressureField", "Profile", "SolidPressureWeights",
-    "Sphere", "Wall", "Walls", "acting_pressure", "directional_permeabilities", "fluxes", "grain_forces",
-    "pore_velocities", "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
+    "Fluid", "Forces", "Paths", "PeriodicFlow", "Point", "PoreFlow", "PoreSizes", "PressureField", "Profile",
+    "SolidPressureWeights", "Sphere", "Wall", "Walls", "acting_pressure", "directional_permeabilities", "fluxes",
+    "grain_forces", "pore_velocities", "solid_pressure_weights", "solve_imposed_flow", "solve_pressure",
 ]  # fmt: skip

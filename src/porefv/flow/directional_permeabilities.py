@@ -16,6 +16,7 @@ from porefv.flow.flux import fluxes, net_outflows, wall_face_fluxes, wall_fluxes
 from porefv.flow.open_path import has_open_path, no_open_path_text
 from porefv.flow.pressure import solve_pressure
 from porefv.flow.walls import Walls
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.solver import TOLERANCE
 
@@ -81,6 +82,7 @@ def directional_permeabilities(
     0.000236, 0.00019, 0.000281 m²
     """
     fluid = fluid if fluid is not None else Fluid()
+    ensure_walls(mesh)
     model = ensure_model(conductance) if conductance is not None else AUTO()
     found, conductances, walls_before = [], np.empty(0), None
     closed: list[str] = []

@@ -148,8 +148,8 @@ def grain_forces(
     on_spheres_v = np.zeros((n + 6, 3))
     cell_pressure = relative[mesh.cell_pore]
     drops = cell_pressure[mesh.facets.cells[:, 0]] - cell_pressure[mesh.facets.cells[:, 1]]
-    for rows, forces in _unit_forces(mesh, walls.slip, split):
-        _scatter(mesh.facets.vertices[rows], drops[rows], forces, on_spheres_p, on_spheres_v)
+    for rows, forces in unit_forces(mesh, walls.slip, split):
+        scatter_forces(mesh.facets.vertices[rows], drops[rows], forces, on_spheres_p, on_spheres_v)
 
     sections = np.array([mesh.box.section(axis) for axis in range(3)])
     faces = mesh.wall_faces
@@ -188,8 +188,8 @@ def facet_forces(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit = "surface"
     united pore is taken as a throat of its own.
     """
     forces = np.empty((len(mesh.facets.cells), 3, 3))
-    for rows, unit_forces in _unit_forces(mesh, slip, split, within=True):
-        forces[rows] = unit_forces.pressure + unit_forces.drag
+    for rows, found in unit_forces(mesh, slip, split, within=True):
+        forces[rows] = found.pressure + found.drag
     return forces
 
 
@@ -246,7 +246,7 @@ class DragLaw(NamedTuple):
     roundness: np.ndarray
 
 
-def _unit_forces(
+def unit_forces(
     mesh: PoreMesh, slip: np.ndarray, split: ForceSplit, *, within: bool = False
 ) -> Iterator[tuple[np.ndarray, UnitForces]]:
     """Facets (m,) of throats, and the forces on their vertices for unit drops, in blocks; then those within pores.
@@ -368,7 +368,7 @@ def _relative_shear(hydraulic_radius, radius):
 
 
 @kernel
-def _scatter(facet_vertices, drops, forces, pressure, viscous):
+def scatter_forces(facet_vertices, drops, forces, pressure, viscous):
     """Add the forces on every facet's vertices, for its pressure drop, to `pressure` and `viscous` (n + 6, 3) [N]."""
     for f in range(facet_vertices.shape[0]):
         if drops[f] == 0.0:

@@ -11,6 +11,7 @@ from porefv.conductance.conductances import check_conductances
 from porefv.errors import InputError, counted
 from porefv.flow.inside import refuse_sources_without_outlet
 from porefv.flow.walls import Walls, ensure_no_imposed_flow
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.solvers.pressure_equation import reached, solve_network
 from porefv.solvers.solver import TOLERANCE, SolverReport
@@ -60,6 +61,7 @@ def as_field(mesh: PoreMesh, pressure: PressureField | np.ndarray) -> PressureFi
     InputError
         For an array of the wrong shape, or with values that are not finite.
     """
+    ensure_walls(mesh)
     if isinstance(pressure, PressureField):
         return pressure
     values = check_by_pore(mesh, pressure)
@@ -70,6 +72,7 @@ def as_field(mesh: PoreMesh, pressure: PressureField | np.ndarray) -> PressureFi
 
 def check_by_pore(mesh: PoreMesh, values: ArrayLike, what: str = "pressure") -> np.ndarray:
     """(n_pores,) float array; InputError if the shape is another, or a value is not finite."""
+    ensure_walls(mesh)
     found = one_value_each(values, mesh.n_pores, "pore", what)
     if not np.isfinite(found).all():
         bad = np.flatnonzero(~np.isfinite(found))
@@ -167,6 +170,7 @@ def solve_pressure(
     >>> solve_pressure(mesh, conductances, walls).pressure.shape
     (122,)
     """
+    ensure_walls(mesh)
     conductances = check_conductances(mesh, conductances)
     if sources is not None:
         sources = check_by_pore(mesh, sources, "sources")

@@ -14,6 +14,7 @@ import numpy as np
 from porefv.conductance.model import ConductanceModel
 from porefv.flow.pressure import PressureField, as_field, held_pressures
 from porefv.flow.walls import Walls, ensure_no_imposed_flow
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 
 # Where between the centre of a pore and its Laguerre vertex the pressure is that acts on the grains: fitted to the
@@ -63,6 +64,7 @@ def solid_pressure_weights(
     -----
     Theory, forces: :eq:`eq-acting-pressure`.
     """
+    ensure_walls(mesh)
     beyond = model.drop_beyond_vertices(mesh.throats, slip)
     if beyond is None:
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from porefv.mesh.cell_mesh import ensure_walls
 from porefv.mesh.pore_mesh import PoreMesh
 
 
@@ -33,9 +34,8 @@ def pore_velocities(
     -----
     Theory, method: :eq:`eq-pore-velocity`.
     """
-    throats = mesh.throats
-    centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]
-    centres /= np.maximum(throats.areas, np.finfo(float).tiny)[:, None]
+    ensure_walls(mesh)
+    throats, centres = mesh.throats, throat_centroids(mesh)
     i, j = throats.pores.T
     faces = mesh.wall_faces
     pores = mesh.cell_pore[faces.cells]
@@ -54,6 +54,13 @@ def pore_velocities(
             )
     volumes = mesh.pore_volumes[:, None]
     return np.divide(moments, volumes, out=np.zeros_like(moments), where=volumes > 0.0)
+
+
+def throat_centroids(mesh: PoreMesh) -> np.ndarray:
+    """(t, 3): centroid of the facets of each throat, from the mesh's local origin [m]."""
+    throats = mesh.throats
+    centres = throats.total_by_facet(mesh.facets.areas[:, None] * mesh.facets.centroids)[throats.first_facets]
+    return centres / np.maximum(throats.areas, np.finfo(float).tiny)[:, None]
 
 
 def _by_pore(mesh: PoreMesh, values: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from porefv.errors import InputError
 from porefv.mesh.cell_kernels import cell_solids, enumerate_wall_faces, polyhedron_volumes, volume_gradients
 from porefv.mesh.facets import Facets
 from porefv.mesh.flat_cells import settle_flat_cells
@@ -44,6 +45,12 @@ class WallFaces:
     centroids: np.ndarray
 
 
+NO_WALLS = (
+    "a periodic mesh has no walls, which this needs: use PeriodicFlow for its flow, or put the packing in a box with "
+    "walls, and use PoreMesh"
+)
+
+
 class CellMesh(FixedInputs):
     """Cells of the regular triangulation of a packing: tetrahedra, wedges and hexahedra that fill the box.
 
@@ -64,13 +71,16 @@ class CellMesh(FixedInputs):
         If the packing is not fit for use (see `Packing.validate`), or has no box.
     """
 
+    # Whether rows of cells, spheres and pores include images of others (`porefv.mesh.PeriodicMesh`).
+    periodic = False
+
     def __init__(self, packing: Packing, box: Box | None = None, *, wall_tolerance: float = 0.05):
         if box is not None:
             packing = packing.with_box(box)
         self.packing = packing.validate(wall_tolerance)
         self.wall_tolerance = wall_tolerance
-        assert packing.box is not None  # validate has seen to it
-        self.box: Box = packing.box
+        assert packing.walled_box is not None  # validate has seen to it
+        self.box: Box = packing.walled_box
 
     # ---- topology ---------------------------------------------------------------------------------------------
 
@@ -132,7 +142,7 @@ class CellMesh(FixedInputs):
     @lazy_property
     def vertices(self) -> np.ndarray:
         """(m, 3): Laguerre vertex (power centre) of each cell [m]."""
-        return self.local_vertices + self.triangulation.origin
+        return self.local_vertices[: self.n_cells] + self.triangulation.origin
 
     @lazy_property
     def cell_volumes(self) -> np.ndarray:
@@ -224,3 +234,9 @@ class CellMesh(FixedInputs):
 
     def __repr__(self) -> str:
         return f"CellMesh({self.n_spheres} spheres, {self.n_cells} cells, box {self.box.sides})"
+
+
+def ensure_walls(mesh: CellMesh) -> None:
+    """InputError if a mesh is periodic: for what needs walls, or takes every row for a cell or pore of its own."""
+    if mesh.periodic:
+        raise InputError(NO_WALLS)

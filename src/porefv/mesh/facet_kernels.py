@@ -29,6 +29,11 @@ class FacetTopology(NamedTuple):
     cells: np.ndarray
     vertices: np.ndarray
 
+    @classmethod
+    def of(cls, count: int) -> FacetTopology:
+        """Arrays for so many facets, to be filled in."""
+        return cls(np.empty((count, 2), np.int32), np.empty((count, 3), np.int32))
+
 
 class FacetPlanes(NamedTuple):
     """`FacetTopology` and the plane of each facet.

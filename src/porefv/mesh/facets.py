@@ -45,8 +45,7 @@ class Facets(FixedInputs):
         """Cells and vertices of each facet, as kernels take them."""
         mesh = self.mesh
         # Every cell has four facets, each shared by two, but for the eight at the corners of the box.
-        count = (4 * mesh.n_cells - 8) // 2
-        found = FacetTopology(np.empty((count, 2), np.int32), np.empty((count, 3), np.int32))
+        found = FacetTopology.of((4 * mesh.n_cells - 8) // 2)
         enumerate_facets(mesh.cells, mesh.neighbours, mesh.n_spheres, found)
         return found
 

@@ -58,6 +58,13 @@ def settle_flat_cells(cells, neighbours, vertices, laguerre_vertices):
         count -= settled
 
 
+@kernel
+def flat_cells(cells, vertices, flat):
+    """Fill in which cells, (m, 4), are flat, (m,) bool: as `settle_flat_cells` takes them."""
+    for t in range(cells.shape[0]):
+        flat[t] = _is_flat(cells[t], vertices)
+
+
 @helper
 def _is_flat(cell, vertices):
     """Whether the directions from a sphere of the cell to its other vertices lie in a plane, but for rounding."""

@@ -91,8 +91,8 @@ class NearestSurface:
     def __init__(self, packing: Packing):
         from scipy.spatial import KDTree
 
-        assert packing.box is not None
-        self._box = packing.box
+        assert packing.walled_box is not None
+        self._box = packing.walled_box
         # Spheres of similar radii together: a centre that is farther by more than their difference is not the nearest.
         classes = np.floor(np.log2(packing.radii / packing.radii.min())).astype(int)
         parts = [classes == kind for kind in np.unique(classes)]

@@ -7,12 +7,10 @@ and on edges of the box, and corners of the box: one node for all cells that hav
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from porefv.mesh.cell_mesh import CellMesh
+from porefv.mesh.cell_mesh import CellMesh
 
 TETRA, WEDGE, HEXAHEDRON = 10, 13, 12  # VTK's cell types
 
@@ -34,7 +32,7 @@ class Polyhedra:
     Attributes
     ----------
     points : (p, 3) array
-        Nodes; node k < n_spheres is the centre of sphere k [m].
+        Nodes; node k < n_spheres is the centre of sphere k, in a periodic cell of an image of it [m].
     types : (m,) uint8 array
         VTK's type of each cell.
     offsets : (m + 1,) int64 array
@@ -56,7 +54,15 @@ class Polyhedra:
 
 
 def polyhedra(mesh: CellMesh) -> Polyhedra:
-    """The cells of a mesh as VTK's: tetrahedra, wedges (3 spheres, a wall), hexahedra (2 and 2, 1 and 3)."""
+    """The cells of a mesh as VTK's: tetrahedra, wedges (3 spheres, a wall), hexahedra (2 and 2, 1 and 3).
+
+    Those of a periodic mesh are the tetrahedra of one period: some reach beyond the periodic cell, to images.
+    """
+    if mesh.periodic:
+        tetrahedra = mesh.cells[: mesh.n_cells, [1, 0, 2, 3]]
+        offsets = np.arange(0, 4 * mesh.n_cells + 1, 4)
+        points = mesh.local_points + mesh.triangulation.origin
+        return Polyhedra(points, np.full(mesh.n_cells, TETRA, np.uint8), offsets, tetrahedra.ravel().astype(np.int64))
     n = mesh.n_spheres
     n_walls = np.count_nonzero(mesh.cells >= n, axis=1)
     types = np.array([TETRA, WEDGE, HEXAHEDRON, HEXAHEDRON], np.uint8)[n_walls]

@@ -101,7 +101,11 @@ class PoreMesh(CellMesh):
     def cells_of_pores(self) -> PoreCells:
         """The cells of each pore."""
         order = np.argsort(self.cell_pore, kind="stable")
-        return PoreCells(order, np.searchsorted(self.cell_pore[order], np.arange(self.n_pores + 1)))
+        return PoreCells(order, np.searchsorted(self.cell_pore[order], np.arange(self.cell_pore.max() + 2)))
+
+    def greatest_of_images(self, values: np.ndarray) -> np.ndarray:
+        """Values of cells (m, ...); in a periodic cell, those of a cell and its images as the greatest of them."""
+        return values
 
     @property
     def n_united(self) -> int:
@@ -111,7 +115,7 @@ class PoreMesh(CellMesh):
     @lazy_property
     def pore_volumes(self) -> np.ndarray:
         """(n_pores,): void volume of each pore [m³]."""
-        return np.bincount(self.cell_pore, self.cell_void_volumes, self.n_pores)
+        return np.bincount(self.cell_pore[: self.n_cells], self.cell_void_volumes, self.n_pores)
 
     @lazy_property
     def pore_surfaces(self) -> np.ndarray:
@@ -121,15 +125,16 @@ class PoreMesh(CellMesh):
         overlap, caps that reach out of a cell count against it, as in `cell_void_volumes`: single flat cells may have
         less than nothing, and a neighbour as much more (docs/theory_method.md, Surfaces of pores).
         """
-        return np.bincount(self.cell_pore, self.cell_surfaces, self.n_pores)
+        return np.bincount(self.cell_pore[: self.n_cells], self.cell_surfaces, self.n_pores)
 
     @lazy_property
     def pore_centres(self) -> np.ndarray:
         """(n_pores, 3): Laguerre vertex of each pore, that of a united pore the mean of those of its cells [m]."""
         if not self.n_united:
             return self.vertices
-        count = np.bincount(self.cell_pore, minlength=self.n_pores)
-        return np.stack([np.bincount(self.cell_pore, x, self.n_pores) / count for x in self.vertices.T], axis=1)
+        pores, vertices = self.cell_pore[: self.n_cells], self.vertices
+        count = np.bincount(pores, minlength=self.n_pores)
+        return np.stack([np.bincount(pores, x, self.n_pores) / count for x in vertices.T], axis=1)
 
     @lazy_property
     def pore_walls(self) -> np.ndarray:

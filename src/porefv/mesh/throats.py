@@ -86,7 +86,7 @@ class Throats(FixedInputs):
         # Only between two Laguerre vertices that are both tied can there be more facets than one.
         several = tied_facets(mesh.facets.cells, mesh.cell_node, mesh.cell_pore)
         nodes = mesh.cell_node[mesh.facets.cells[several]].astype(np.int64)
-        keys = nodes.min(axis=1) * mesh.n_cells + nodes.max(axis=1)
+        keys = nodes.min(axis=1) * len(mesh.cells) + nodes.max(axis=1)
         _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
         first = first[inverse]
         further = np.flatnonzero(first != np.arange(len(several)))
@@ -308,7 +308,7 @@ class Throats(FixedInputs):
             (start, *triple)
             for start, corners in polygons.items()
             for triple in combinations(sorted(corners), 3)  # walls come last: their numbers follow the spheres'
-            if triple[0] < mesh.n_spheres
+            if triple[0] < mesh.cell_vertices.n_spheres
         ]
         table = np.array(rows, np.int32).reshape(-1, 4)
         return self.facet_throat[table[:, 0]], table[:, 1:].copy()

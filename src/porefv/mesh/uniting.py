@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from porefv.system.growing_arrays import doubled
-from porefv.system.kernels import kernel
+from porefv.system.kernels import helper, kernel
 from porefv.system.union_find import join
 
 
@@ -48,6 +48,72 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
         else:
             parent[t] = parent[parent[t]]
     return parent
+
+
+@kernel
+def join_with_steps(cells, neighbours, jumps, parent, steps):
+    """Join cells to their neighbours some steps away, label them, and fill in the steps to beside the first of each.
+
+    Parameters
+    ----------
+    cells, neighbours : (k,) int arrays
+    jumps : (k, 3) int array
+        Steps to the image of the neighbour that is joined.
+    parent : (m,) int32 array
+        The number of each cell; to be changed to labels, in the order of the cells.
+    steps : (m, 3) int array
+        Zero.
+
+    Returns
+    -------
+    int
+        A cell that is joined to an image of itself, -1 if there is none.
+    """
+    for link in range(cells.shape[0]):
+        i, x, y, z = _root(cells[link], parent, steps)
+        j, u, v, w = _root(neighbours[link], parent, steps)
+        # A cell's image, `steps` away from it, is beside its root.
+        u, v, w = x + jumps[link, 0] - u, y + jumps[link, 1] - v, z + jumps[link, 2] - w
+        if i == j:
+            if u != 0 or v != 0 or w != 0:
+                return cells[link]
+        elif i < j:
+            parent[j] = i
+            steps[j, 0], steps[j, 1], steps[j, 2] = u, v, w
+        else:
+            parent[i] = j
+            steps[i, 0], steps[i, 1], steps[i, 2] = -u, -v, -w
+    count = 0
+    for t in range(parent.shape[0]):
+        root, x, y, z = _root(t, parent, steps)
+        if root != t:
+            parent[t] = root
+            steps[t, 0], steps[t, 1], steps[t, 2] = x, y, z
+    for t in range(parent.shape[0]):  # a root comes before all below it
+        if parent[t] == t:
+            parent[t] = count
+            count += 1
+        else:
+            parent[t] = parent[parent[t]]
+    return -1
+
+
+@helper
+def _root(i, parent, steps):
+    """Root of i, and the steps from i to its image beside that."""
+    x = y = z = 0
+    while parent[i] != i:
+        up = parent[i]
+        if parent[up] != up:  # halve the path
+            steps[i, 0] += steps[up, 0]
+            steps[i, 1] += steps[up, 1]
+            steps[i, 2] += steps[up, 2]
+            parent[i] = parent[up]
+        x += steps[i, 0]
+        y += steps[i, 1]
+        z += steps[i, 2]
+        i = parent[i]
+    return i, x, y, z
 
 
 @kernel

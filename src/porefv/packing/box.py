@@ -78,6 +78,10 @@ class Box:
         with np.errstate(over="ignore", under="ignore"):
             return float(np.prod(self.size))
 
+    def scaled(self, factor: float) -> Box:
+        """The box with all lengths multiplied by a factor."""
+        return Box(self.lower * factor, self.upper * factor)
+
     def section(self, axis: int) -> float:
         """Area of a section normal to an axis (0, 1 or 2), m²."""
         return float(np.prod(np.delete(self.size, axis)))

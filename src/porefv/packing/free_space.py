@@ -61,7 +61,7 @@ def wall_layers(packing: Packing) -> tuple[WallLayer, ...]:
     InputError
         If the packing has no box.
     """
-    box = packing.box
+    box = packing.walled_box
     if box is None:
         raise InputError("the packing has no box, and gaps are those to its walls")
     radius = float(packing.radii.mean())
@@ -134,10 +134,10 @@ def fitted(packing: Packing, how: str) -> Packing:
     around = Box.around(packing)
     if how == "fit":
         return packing.with_box(around)
-    if packing.box is None:
+    if packing.walled_box is None:
         raise InputError('the packing has no box of which walls could be moved: give box = "fit"')
-    far = _gaps(packing, packing.box) > _FREE * packing.radii.mean()
-    return packing.with_box(Box.between(np.where(far, around.wall_places, packing.box.wall_places)))
+    far = _gaps(packing, packing.walled_box) > _FREE * packing.radii.mean()
+    return packing.with_box(Box.between(np.where(far, around.wall_places, packing.walled_box.wall_places)))
 
 
 def _gaps(packing: Packing, box: Box) -> Floats:

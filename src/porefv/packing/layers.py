@@ -56,7 +56,7 @@ def layer_porosities(packing: Packing, axis: int, edges: ArrayLike) -> Floats:
     >>> layer_porosities(ball, 2, [0.0, 0.5, 1.0]).round(6).tolist()  # 1 - π / 6
     [0.476401, 0.476401]
     """
-    box = packing.box
+    box = packing.walled_box
     if box is None:
         raise InputError("the packing has no box, and layers lie between two of its walls")
     edges = np.asarray(edges, float)

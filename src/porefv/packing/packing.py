@@ -1,4 +1,4 @@
-"""Packing: spheres in a box with six walls; what they fill, where they overlap, and whether they fit."""
+"""Packing: spheres in a box or in a periodic cell; what they fill, where they overlap, and whether they fit."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from porefv.errors import InputError, PackingFileWarning, counted, vector
 from porefv.packing.box import WALLS, Box, Floats, read_only
+from porefv.packing.cell import Cell
 from porefv.packing.overlaps import Overlaps, cap_volume, lens_volume, sphere_volumes
 from porefv.packing.reading import Reading
 from porefv.system.html_table import html_table, range_text
 from porefv.system.number_checks import is_finite_number
+
+if TYPE_CHECKING:
+    from porefv.packing.periodic_overlaps import PeriodicOverlaps
 
 _MOST_SHOWN = 5  # culprits listed in one error
 
@@ -53,7 +58,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Packing:
-    """Spheres, and the box whose six walls confine them.
+    """Spheres, and the box whose six walls confine them, or the periodic cell that repeats them.
 
     Spheres are known by their position in `centres`. The arrays are copied, converted to float64, and
     read-only.
@@ -62,8 +67,9 @@ class Packing:
     ----------
     centres : (n, 3) array, m
     radii : (n,) array, m
-    box : Box, optional
-        Needed by everything about porosity and flow.
+    box : Box or Cell, optional
+        Needed by everything about porosity and flow. In a periodic `Cell`, each sphere may be given by any of its
+        images.
     source : Source, optional
         File the spheres come from, to be named in errors.
     metadata : dict, optional
@@ -83,7 +89,7 @@ class Packing:
 
     centres: Floats
     radii: Floats
-    box: Box | None
+    box: Box | Cell | None
     source: Source | None
     metadata: dict[str, str]
 
@@ -91,16 +97,16 @@ class Packing:
         self,
         centres: ArrayLike,
         radii: ArrayLike,
-        box: Box | None = None,
+        box: Box | Cell | None = None,
         source: Source | None = None,
         metadata: dict[str, str] | None = None,
     ):
         centres, radii = read_only(centres, "centres"), read_only(radii, "radii")
-        if box is not None and not isinstance(box, Box):
+        if box is not None and not isinstance(box, Box | Cell):
             try:
                 box = Box(*box)
             except TypeError:
-                raise InputError(f"box must be a Box, or its two corners, not {box!r}") from None
+                raise InputError(f"box must be a Box, its two corners, or a Cell, not {box!r}") from None
         given = {"centres": centres, "radii": radii, "box": box, "source": source, "metadata": metadata or {}}
         for name, value in given.items():
             object.__setattr__(self, name, value)
@@ -130,7 +136,7 @@ class Packing:
         cls,
         path: str | PathLike[str],
         format: str | None = None,
-        box: Box | None = None,
+        box: Box | Cell | None = None,
         *,
         columns: Mapping[str, str] | None = None,
         radius: float | None = None,
@@ -151,19 +157,26 @@ class Packing:
 
         write_packing(self, path, format=format)
 
-    def with_box(self, box: Box) -> Packing:
-        """The same spheres in another box."""
+    def with_box(self, box: Box | Cell) -> Packing:
+        """The same spheres in another box, or in a periodic cell."""
         return replace(self, box=box)
+
+    def wrapped(self) -> Packing:
+        """The packing of a periodic cell with every centre in the cell; `metadata` says how many were outside."""
+        cell = self.require_cell()
+        outside = int(np.count_nonzero(cell.steps(self.centres).any(axis=1)))
+        metadata = self.metadata | ({"wrapped": str(outside)} if outside else {})
+        return replace(self, centres=cell.wrapped(self.centres), metadata=metadata)
 
     def scaled(self, factor: float) -> Packing:
         """The packing with all lengths, those of its box included, multiplied by a factor."""
         if not (is_finite_number(factor) and factor > 0.0):
             raise InputError(f"the factor of lengths must be a positive number, not {factor!r}")
-        box = None if self.box is None else Box(self.box.lower * factor, self.box.upper * factor)
+        box = None if self.box is None else self.box.scaled(factor)
         return replace(self, centres=self.centres * factor, radii=self.radii * factor, box=box)
 
     def cropped(self, box: Box) -> Packing:
-        """The spheres whose centres lie in a box, in that box.
+        """The spheres whose centres lie in a box, in that box; of a packing in a periodic cell, all their images.
 
         Spheres that reach beyond its walls are cut by them: the part inside stays. Such a packing needs a
         `wall_tolerance` of the mesh that is large enough; 1 is for any crop. Of spheres whose centres are outside, the
@@ -174,6 +187,8 @@ class Packing:
         InputError
             If no centre is in the box.
         """
+        if isinstance(self.box, Cell):
+            return self._images_around(box, self.box).cropped(box)
         distances = box.wall_distances(self.centres)
         inside = (distances > 0.0).all(axis=1)
         if not inside.any():
@@ -181,6 +196,19 @@ class Packing:
         lost = int(np.count_nonzero(~inside & (distances > -self.radii[:, None]).all(axis=1)))
         metadata = self.metadata | ({"caps_lost": str(lost)} if lost else {})
         return Packing(self.centres[inside], self.radii[inside], box, metadata=metadata)
+
+    def _images_around(self, box: Box, cell: Cell) -> Packing:
+        """All images of the spheres of a periodic cell in a box and around it."""
+        reach = self.radii.max()
+        corners = np.stack(np.meshgrid(*zip(box.lower - reach, box.upper + reach, strict=True)), axis=-1).reshape(-1, 3)
+        steps = cell.steps(corners)
+        ranges = [np.arange(least, most + 1) for least, most in zip(steps.min(axis=0), steps.max(axis=0), strict=True)]
+        moves = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3) @ cell.vectors
+        points = (cell.wrapped(self.centres)[:, None] + moves).reshape(-1, 3)
+        near = ((points > box.lower - reach) & (points < box.upper + reach)).all(axis=1)
+        if not near.any():
+            raise InputError(f"{self._path()}no centre lies in the box {vector(box.lower)} to {vector(box.upper)}.")
+        return Packing(points[near], np.repeat(self.radii, len(moves))[near], metadata=self.metadata)
 
     @property
     def bounding_box(self) -> Box:
@@ -199,6 +227,8 @@ class Packing:
     @cached_property
     def overlaps(self) -> Overlaps:
         """Pairs of spheres that overlap, and spheres that cross walls (none without a box)."""
+        if isinstance(self.box, Cell):
+            return self._periodic.overlaps
         # Not at the top: it loads numba and scipy, which a script that only reads a packing does not need.
         from porefv.packing.neighbours import neighbour_pairs
 
@@ -211,6 +241,15 @@ class Packing:
         wall_depths = self.radii[:, None] - self._wall_distances()
         spheres, walls = np.nonzero(wall_depths > 0)
         return Overlaps(pairs, depths, spheres.astype(np.int32), walls.astype(np.int32), wall_depths[spheres, walls])
+
+    @cached_property
+    def _periodic(self) -> PeriodicOverlaps:
+        from porefv.packing.periodic_overlaps import periodic_overlaps
+
+        try:
+            return periodic_overlaps(self.centres, self.radii, self.require_cell())
+        except InputError as error:
+            raise InputError(f"{self._path()}{error}") from None
 
     @cached_property
     def solid_volume(self) -> float:
@@ -235,6 +274,10 @@ class Packing:
 
     @property
     def _union_volume(self) -> float:
+        if isinstance(self.box, Cell):
+            from porefv.mesh.periodic_mesh import PeriodicMesh
+
+            return float(PeriodicMesh(self).facets.solids.sum())
         from porefv.mesh.cell_mesh import CellMesh
 
         packing = self
@@ -246,6 +289,8 @@ class Packing:
     @cached_property
     def triple_overlaps(self) -> int:
         """Number of triples, of spheres or of spheres and walls, with a point in common."""
+        if isinstance(self.box, Cell):
+            return self._periodic.triples
         found = self.overlaps
         if len(found.pairs) + len(found.wall_ids) == 0:
             return 0
@@ -261,10 +306,11 @@ class Packing:
         return 1.0 - self.solid_volume / self._require_box().volume
 
     def validate(self, wall_tolerance: float = 0.05) -> Packing:
-        """Check that the spheres fit one another and the box.
+        """Check that the spheres fit one another and the box, or the periodic cell.
 
         Overlap (cemented or compressed grains, clumps) is legitimate, as long as no sphere lies within another one. A
-        sphere may reach beyond a wall by a fraction of its radius. Centres lie strictly inside the box.
+        sphere may reach beyond a wall by a fraction of its radius. Centres lie strictly inside the box. In a periodic
+        cell, no sphere holds the centre of an image of itself.
 
         Parameters
         ----------
@@ -284,12 +330,13 @@ class Packing:
         if not wall_tolerance >= 0:
             raise InputError(f"wall_tolerance must be a number >= 0, not {wall_tolerance}.")
         box = self._require_box()
-        if not (box.size.min() >= SHORTEST and box.size.max() <= LONGEST):
+        sides = box.lengths if isinstance(box, Cell) else box.size
+        if not (sides.min() >= SHORTEST and sides.max() <= LONGEST):
             raise InputError(
-                f"{self._path()}the box has sides {vector(box.size)} m; they must lie between {SHORTEST:g} and "
+                f"{self._path()}the box has sides {vector(sides)} m; they must lie between {SHORTEST:g} and "
                 f"{LONGEST:g} m. Give lengths in another unit."
             )
-        finest = FINEST * box.size.max()
+        finest = FINEST * sides.max()
         self._refuse(
             np.flatnonzero((self.radii < finest) | (self.radii > LONGEST)),
             f"radius not between {finest:.3g} m, which is {FINEST:g} of the box, and {LONGEST:g} m",
@@ -297,6 +344,31 @@ class Packing:
             lambda i: f"{self._name(i)}: radius {self.radii[i]:.9g}",
             "Correct or remove these spheres.",
         )
+        if isinstance(box, Cell):
+            self._refuse_own_images(box)
+        else:
+            self._refuse_beyond_walls(box, wall_tolerance)
+        pairs = self.overlaps.pairs
+        self._refuse(
+            np.flatnonzero(self.overlaps.depths >= (2.0 - _WITHIN) * self.radii[pairs].min(axis=1)),
+            "one sphere lies within another",
+            "pair",
+            lambda k: self._describe_within(pairs[k, 0], pairs[k, 1]),
+            "Remove the inner sphere of each pair, or correct centres and radii.",
+        )
+        self._warn_nearly_within()
+        return self
+
+    def _refuse_own_images(self, cell: Cell) -> None:
+        self._refuse(
+            np.flatnonzero(self.radii >= cell.shortest),
+            "sphere holds the centre of its own image",
+            "sphere",
+            lambda i: f"{self._name(i)}: radius {self.radii[i]:.9g} m, next image {cell.shortest:.9g} m away",
+            "Correct these radii, or give a larger periodic cell.",
+        )
+
+    def _refuse_beyond_walls(self, box: Box, wall_tolerance: float) -> None:
         distances = self._wall_distances()
         nearest = distances.argmin(axis=1)
         beyond = self.radii - distances.min(axis=1)
@@ -325,16 +397,6 @@ class Packing:
             ),
             enlarge,
         )
-        pairs = self.overlaps.pairs
-        self._refuse(
-            np.flatnonzero(self.overlaps.depths >= (2.0 - _WITHIN) * self.radii[pairs].min(axis=1)),
-            "one sphere lies within another",
-            "pair",
-            lambda k: self._describe_within(pairs[k, 0], pairs[k, 1]),
-            "Remove the inner sphere of each pair, or correct centres and radii.",
-        )
-        self._warn_nearly_within()
-        return self
 
     def _warn_nearly_within(self) -> None:
         """Warn of spheres that lie within another but for a small part: most are the same sphere, given twice."""
@@ -356,13 +418,15 @@ class Packing:
     def __repr__(self) -> str:
         smallest, largest = self.radii.min(), self.radii.max()
         radii = f"radius {smallest:.3g}" if smallest == largest else f"radii {smallest:.3g}...{largest:.3g}"
-        box = "no box" if self.box is None else f"box {self.box.sides}"
+        box = "no box" if self.box is None else f"{self._kind_of_box} {self.box.sides}"
         return f"Packing({counted(len(self), 'sphere')}, {radii} m, {box})"
 
     def _repr_html_(self) -> str:
         rows = [("spheres", str(len(self))), ("radii", range_text(self.radii, "m"))]
         if self.box is None:
             rows.append(("box", "none"))
+        elif isinstance(self.box, Cell):
+            rows.append(("periodic cell", self.box.sides))
         else:
             box = self.box
             rows += [("box", f"{vector(box.lower)} to {vector(box.upper)} m"), ("sides", box.sides)]
@@ -371,10 +435,38 @@ class Packing:
         return html_table("Packing", rows)
 
     def _wall_distances(self) -> Floats:
-        """(n, 6) distance of each centre from each wall, m, positive inside; (n, 0) without a box."""
-        return np.empty((len(self), 0)) if self.box is None else self.box.wall_distances(self.centres)
+        """(n, 6) distance of each centre from each wall, m, positive inside; (n, 0) without walls."""
+        return self.box.wall_distances(self.centres) if isinstance(self.box, Box) else np.empty((len(self), 0))
 
-    def _require_box(self) -> Box:
+    @property
+    def _kind_of_box(self) -> str:
+        return "periodic cell" if isinstance(self.box, Cell) else "box"
+
+    @property
+    def walled_box(self) -> Box | None:
+        """The box, None without one, for what needs walls.
+
+        Raises
+        ------
+        InputError
+            If the packing is in a periodic cell.
+        """
+        if isinstance(self.box, Cell):
+            raise InputError(
+                f"{self._path()}the packing is in a periodic cell, which has no walls: porefv has PeriodicMesh and "
+                "PeriodicFlow for it, and packing.with_box(Box(lower, upper)) puts the spheres between walls."
+            )
+        return self.box
+
+    def require_cell(self) -> Cell:
+        """The periodic cell; InputError if the packing is in none."""
+        if not isinstance(self.box, Cell):
+            raise InputError(
+                f"{self._path()}the packing is in no periodic cell. Give it one: packing.with_box(Cell(vectors))."
+            )
+        return self.box
+
+    def _require_box(self) -> Box | Cell:
         if self.box is None:
             raise InputError(
                 f"{self._path()}the packing has no box. Give one: lines '# box_lower = x y z' and "

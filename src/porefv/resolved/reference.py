@@ -284,7 +284,7 @@ class StokesReference:
 
     def write(self, path: str | PathLike[str]) -> None:
         """Write a JSON file, which appears whole or not at all."""
-        box = self.packing.box
+        box = self.packing.walled_box
         assert box is not None
         content = {
             "kind": _KIND,

@@ -9,7 +9,7 @@ import numpy as np
 
 from porefv.errors import ComputationError
 from porefv.solvers.network import Network
-from porefv.solvers.solver import TOLERANCE, SolverReport, solve_split
+from porefv.solvers.solver import TOLERANCE, Solver, SolverReport
 from porefv.system.kernels import kernel, read_only
 from porefv.system.union_find import join
 
@@ -182,7 +182,7 @@ def _solve_free(pairs, conductances, pressure, rest, free, sources, solver, tole
     """Solve for the pressures of the free pores, in place; all others are held."""
     network, rhs = free_network(pairs, conductances, pressure, free, sources)
     held = _held_beside(pairs, conductances, pressure, free, (rhs - sources[free]), network.leaks)
-    solution = solve_split(network, held, sources[free], solver, tolerance)
+    solution = Solver(network, solver).solve_split(held, sources[free], tolerance)
     pressure[free] = solution.pressure
     rest[free] = solution.rest
     return solution.report

@@ -63,6 +63,15 @@ class SolverReport:
     pressure_error: float = float("nan")
 
 
+@dataclass(frozen=True)
+class SplitSolution:
+    """Pressures (n,) as sums of two doubles, so that the flow through the stiffest throat is in their differences."""
+
+    pressure: np.ndarray
+    rest: np.ndarray
+    report: SolverReport
+
+
 class Solver:
     """A network made ready to be solved, for one right-hand side or for many.
 
@@ -90,10 +99,16 @@ class Solver:
     def __init__(self, network: Network, solver: str = "auto", *, many: bool = False):
         if solver not in SOLVERS:
             raise InputError(f"unknown solver {solver!r}; known: {', '.join(SOLVERS)}")
+        asked = solver
         if solver == "auto":
             solver = "direct" if len(network) <= (DIRECT_LIMIT_MANY if many else DIRECT_LIMIT) else "cg"
         self.network = network
         self.name = solver
+        self._may_fall_back = asked == "auto" and solver != "cg"
+
+    @cached_property
+    def _fallback(self) -> Solver | None:
+        return Solver(self.network, "cg") if self._may_fall_back else None
 
     @cached_property
     def _factor(self) -> DirectFactor | ApproximateCholesky:
@@ -148,82 +163,77 @@ class Solver:
             )
         return x, report
 
+    def solve_split(
+        self, held: np.ndarray, sources: np.ndarray, tolerance: float = TOLERANCE, drive: float | None = None
+    ) -> SplitSolution:
+        """Solve A x = leaks held + sources to the tolerance, however far apart conductances are.
 
-@dataclass(frozen=True)
-class SplitSolution:
-    """Pressures (n,) as sums of two doubles, so that the flow through the stiffest throat is in their differences."""
+        Where rounding of its factor leaves `direct` short of that, `auto` goes on with `cg`.
 
-    pressure: np.ndarray
-    rest: np.ndarray
-    report: SolverReport
+        Parameters
+        ----------
+        held : (n,) array
+            Pressure that each node's leaks lead to [Pa].
+        sources : (n,) array
+            Volume injected into each node per unit time [m³/s].
+        tolerance : float
+            See `solve`.
+        drive : float, optional
+            What the error of pressures is measured against; by default the range of the held ones, where nothing else
+            drives the flow [Pa].
 
-
-def solve_split(
-    network: Network, held: np.ndarray, sources: np.ndarray, solver: str = "auto", tolerance: float = TOLERANCE
-) -> SplitSolution:
-    """Solve A x = leaks held + sources to the tolerance, however far apart conductances are.
-
-    Where rounding of its factor leaves `direct` short of that, `auto` goes on with `cg`.
-
-    Parameters
-    ----------
-    network : Network
-    held : (n,) array
-        Pressure that each node's leaks lead to [Pa].
-    sources : (n,) array
-        Volume injected into each node per unit time [m³/s].
-    solver, tolerance
-        See `Solver`.
-
-    Raises
-    ------
-    InputError, ComputationError
-        As `Solver.solve`; also if pressures cannot be told to `PRESSURE_TOLERANCE` of their range.
-    """
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
-    begin = time.perf_counter()
-    ready = Solver(network, solver)
-    n = len(network)
-    values = held[network.leaks > 0.0]
-    span = float(np.ptp(values)) if len(values) else 0.0
-    if n == 0 or (span == 0.0 and not sources.any()):  # nothing is driven
-        pressure = np.full(n, values[0] if n else 0.0)
-        report = SolverReport(ready.name, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin, 0.0)
-        return SplitSolution(pressure, np.zeros(n), report)
-    accuracy = max(PRESSURE_TOLERANCE, tolerance) * span if span > 0.0 and not sources.any() else np.inf
-    found = None
-    for name in dict.fromkeys((ready.name, "cg") if solver == "auto" else (ready.name,)):
-        try:
-            factor = Solver(network, name)._factor
-        except ComputationError:  # singular, or by rounding as good as that
-            continue
-        found = refined(network, held, sources, factor, tolerance, accuracy)
-        if found.lost <= tolerance * found.flow and found.error <= accuracy:
-            break
-    if found is None:
-        raise ComputationError(
-            "the network is singular: a part of it is not joined to any imposed pressure, or by conductances "
-            "too many decades below its own"
-        )
-    reached = found.lost / found.flow if found.flow > 0.0 else 0.0
-    if not reached <= tolerance:
-        if _driven(network, network.leaks * held + sources):
+        Raises
+        ------
+        InputError, ComputationError
+            As `solve`; also if pressures cannot be told to `PRESSURE_TOLERANCE` of their range.
+        """
+        if not 0.0 < tolerance < 1.0:
+            raise InputError(f"the solver's tolerance must lie between 0 and 1, not {tolerance!r}")
+        begin = time.perf_counter()
+        network, n = self.network, len(self.network)
+        values = held[network.leaks > 0.0]
+        span = float(np.ptp(values)) if len(values) else 0.0
+        if n == 0 or (span == 0.0 and not sources.any()):  # nothing is driven
+            pressure = np.full(n, values[0] if n else 0.0)
+            report = SolverReport(self.name, n, 0, tolerance, 0.0, 0.0, time.perf_counter() - begin, 0.0)
+            return SplitSolution(pressure, np.zeros(n), report)
+        if drive is None:
+            drive = span if span > 0.0 and not sources.any() else np.inf
+        accuracy = max(PRESSURE_TOLERANCE, tolerance) * drive
+        found = None
+        for ready in (self,) if self._fallback is None else (self, self._fallback):
+            name = ready.name
+            try:
+                factor = ready._factor
+            except ComputationError:  # singular, or by rounding as good as that
+                continue
+            found = refined(network, held, sources, factor, tolerance, accuracy)
+            if found.lost <= tolerance * found.flow and found.error <= accuracy:
+                break
+        if found is None:
             raise ComputationError(
-                f"the {name} solver stopped at a flux imbalance of {reached:.1e} after {found.iterations} iterations "
-                f"(asked: {tolerance:.1e}): conductances differ by too many decades, leave out spheres that are much "
-                "smaller than the rest; or try another solver, or a larger tolerance"
+                "the network is singular: a part of it is not joined to any imposed pressure, or by conductances "
+                "too many decades below its own"
             )
-        reached = 0.0  # equal pressures: nothing flows but what rounding makes
-    if not found.error <= accuracy:
-        raise ComputationError(
-            f"pressures are uncertain by {found.error / span:.1e} of their range: some pores are joined to the rest by "
-            "conductances too many decades below their own; leave out spheres that are much smaller than the rest"
-        )
-    error = found.error / span if span > 0.0 else float("nan")
-    seconds = time.perf_counter() - begin
-    report = SolverReport(name, n, found.iterations, tolerance, reached, 0.0, seconds, error)
-    return SplitSolution(found.x, found.rest, report)
+        reached = found.lost / found.flow if found.flow > 0.0 else 0.0
+        if not reached <= tolerance:
+            if _driven(network, network.leaks * held + sources):
+                raise ComputationError(
+                    f"the {name} solver stopped at a flux imbalance of {reached:.1e} after {found.iterations} "
+                    f"iterations (asked: {tolerance:.1e}): conductances differ by too many decades, leave out spheres "
+                    "that are much smaller than the rest; or try another solver, or a larger tolerance"
+                )
+            reached = 0.0  # equal pressures: nothing flows but what rounding makes
+        if not found.error <= accuracy:
+            raise ComputationError(
+                f"pressures are uncertain by {found.error / drive:.1e} of their range: some pores are joined to the "
+                "rest by conductances too many decades below their own; leave out spheres that are much smaller than "
+                "the rest"
+            )
+        error = found.error / drive if np.isfinite(drive) else found.error / span if span > 0.0 else float("nan")
+        seconds = time.perf_counter() - begin
+        report = SolverReport(name, n, found.iterations, tolerance, reached, 0.0, seconds, error)
+        return SplitSolution(found.x, found.rest, report)
 
 
 def _driven(network: Network, rhs: np.ndarray) -> bool:

@@ -244,10 +244,41 @@ def test_columns_of_a_dump_can_be_mapped_and_a_radius_given(read):
 @pytest.mark.parametrize(("bounds", "axes"), [("pp ff ff", "x"), ("ff pp pp", "y, z"), ("pp pp pp", "x, y, z")])
 def test_periodic_axes_are_refused_or_ignored_by_name(read, error, bounds, axes):
     said = error(frame(0, 0.1, bounds=bounds))
-    assert said.startswith(f", line 5: the packing is periodic along {axes} (BOX BOUNDS {bounds}), and porefv has no")
+    assert said.startswith(f", line 5: the packing is periodic along {axes} (BOX BOUNDS {bounds}). Give ")
     assert re.search('Give periodic = "ignore"', said)
     packing = read(frame(0, 0.1, bounds=bounds), periodic="ignore")
     assert packing.reading.periodicity.startswith(f"periodic along {axes}") and packing.box.volume == 16
+    if axes == "x, y, z":
+        cell = read(frame(0, 0.1, bounds=bounds), periodic="cell").box
+        np.testing.assert_array_equal(cell.vectors, np.diag([2, 2, 4]))
+        np.testing.assert_array_equal(cell.origin, [-1, 0, 0])
+    else:
+        with pytest.raises(InputError, match=f"periodic along {axes} alone .*periodic cells without walls only"):
+            read(frame(0, 0.1, bounds=bounds), periodic="cell")
+
+
+def test_a_tilted_box_is_a_periodic_cell(read):
+    # Of a box of sides 2, 2 and 4 at (-1, 0, 0) with the tilts xy 0.5, xz -0.25 and yz 1.
+    content = frame(0, 0.1, bounds="xy xz yz pp pp pp")
+    for side, bound in (("-1 1", "-1.25 1.5 0.5"), ("0 2", "0 3 -0.25"), ("0 4", "0 4 1")):
+        content = content.replace(f"{side}\n", f"{bound}\n", 1)
+    with pytest.raises(InputError, match="line 6: the box is tilted"):
+        read(content, periodic="ignore")
+    packing = read(content, periodic="cell")
+    np.testing.assert_allclose(packing.box.vectors, [[2, 0, 0], [0.5, 2, 0], [-0.25, 1, 4]])
+    np.testing.assert_array_equal(packing.box.origin, [-1, 0, 0])
+    plain = read(content, periodic="cell").centres
+    scaled = read(content.replace(" x y z", " xs ys zs"), periodic="cell").centres
+    np.testing.assert_allclose(scaled, [-1, 0, 0] + plain @ packing.box.vectors)
+
+
+def test_a_data_file_is_read_into_a_periodic_cell(read):
+    moved = DATA.replace("0.7 0.8 0.9 0 0 0", "0.7 0.8 0.9 1 0 -1")  # an atom that has crossed a boundary
+    packing = read(moved, periodic="cell")
+    np.testing.assert_array_equal(packing.box.vectors, np.diag([2, 2.5, 10]))
+    assert packing.reading.periodicity.startswith("periodic by image flags along x, z")
+    tilted = read(DATA.replace("zlo zhi\n", "zlo zhi\n0.5 0 -0.5 xy xz yz\n"), periodic="cell")
+    np.testing.assert_array_equal(tilted.box.vectors, [[2, 0, 0], [0.5, 2.5, 0], [0, -0.5, 10]])
 
 
 def test_bounds_without_flags_are_not_periodic(read):

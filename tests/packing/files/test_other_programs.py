@@ -113,6 +113,9 @@ def test_a_lattice_without_pbc_is_periodic_as_ase_reads_it(read):
         read(content)
     assert "Lattice without pbc" in read(content, periodic="ignore").reading.periodicity
     assert read(XYZ.format(0.1)).reading.periodicity == ""
+    tilted = read(content.replace("1 0 0 0 2", "1 0.1 0 0 2"), periodic="cell").box
+    np.testing.assert_array_equal(tilted.vectors[0], [1, 0.1, 0])
+    assert read(content, periodic="cell").box.is_orthogonal
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from porefv.errors import InputError, PackingFileWarning
+from porefv.packing.cell import Cell
 
 
 @pytest.mark.parametrize(
@@ -138,7 +139,8 @@ def test_columns_are_mapped_by_name_or_by_place(read):
         ({"scale": float("nan")}, "scale must be a positive number of m, not nan"),
         ({"frame": 1.5}, "frame must be a whole number"),
         ({"frame": 1}, "frame 1 is asked for, and the file has one frame, 0"),
-        ({"periodic": "yes"}, 'periodic must be "ignore", or not be given'),
+        ({"periodic": "yes"}, 'periodic must be "cell", "ignore", or not be given'),
+        ({"periodic": "cell"}, "the file has no box. Give the periodic cell, as in box=Cell(vectors)"),
     ],
 )
 def test_impossible_options_are_refused(read, options, said):
@@ -295,3 +297,12 @@ def test_units_may_stand_under_the_names(read, header):
     np.testing.assert_allclose(packing.radii, 0.04, rtol=1e-15)
     with pytest.raises(InputError, match="line 2: the unit under 'x_mm' is 'm'"):
         read("x_mm,y_mm,z_mm,r_mm\nm,m,m,m\n1,2,3,4\n")
+
+
+def test_a_spherepack_file_is_read_into_its_periodic_cell(read):
+    packing = read("##PERIODIC:: 1 2 3\n0.5 2.5 -0.5 0.1 -1\n", "grains.txt", periodic="cell")
+    np.testing.assert_array_equal(packing.box.vectors, np.diag([1, 2, 3]))
+    np.testing.assert_allclose(packing.wrapped().centres, [[0.5, 0.5, 2.5]])
+    assert packing.reading.periodicity == "periodic along x, y, z (##PERIODIC::), read into a periodic cell"
+    given = read("x,y,z,r\n0.1,0.2,0.3,0.04\n", box=Cell([2, 2, 2], [1, 0, 0]), scale=0.5)
+    assert given.box.volume == 8 and given.radii[0] == 0.02

@@ -84,7 +84,7 @@ class SectionFriction(ConductanceModel):
             throats.inscribed_circles(slip)[1],
         )
         conductivity, parts = np.empty(len(which)), np.empty((len(which) if beyond else 0, 2))
-        radii = mesh.packing.radii
+        radii = mesh.cell_vertices.sizes[: mesh.cell_vertices.n_spheres]
         for_rows(
             section_friction,
             len(which),

@@ -51,7 +51,7 @@ def centres_of_pores(throats: Throats) -> np.ndarray:
     """
     mesh = throats.mesh
     pores = Pores(mesh.cells, mesh.cell_pore, *mesh.cells_of_pores)
-    parts, centres = np.zeros((mesh.n_cells, 4)), np.empty((mesh.n_cells, 3))
+    parts, centres = np.zeros((len(mesh.cells), 4)), np.empty((len(mesh.cells), 3))
     _shift_parts(
         throats.facets_of_throats,
         throats.effective_lengths,
@@ -61,7 +61,8 @@ def centres_of_pores(throats: Throats) -> np.ndarray:
         mesh.local_vertices,
         parts,
     )
-    for_rows(_pore_centres, mesh.n_pores, pores, mesh.cell_vertices, mesh.local_vertices, parts, centres)
+    parts = mesh.greatest_of_images(parts)
+    for_rows(_pore_centres, len(pores.starts) - 1, pores, mesh.cell_vertices, mesh.local_vertices, parts, centres)
     return centres
 
 

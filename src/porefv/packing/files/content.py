@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from porefv.errors import InputError, PackingFileWarning
 from porefv.packing.box import Box
+from porefv.packing.cell import Cell
 from porefv.packing.files.options import ReadOptions
 from porefv.packing.files.text import AnyPath, make_box, quoted
 from porefv.packing.packing import Packing, Source
@@ -53,6 +54,8 @@ class FileContent:
         None: the file has none, and the user gives one radius.
     corners : pair of (3,) arrays, optional
         Lower and upper corner of the box.
+    lattice : (3, 3) array, optional
+        Vectors of a tilted periodic cell, from the lower corner.
     box_place : str
         What states the box.
     unit : LengthUnit, optional
@@ -76,16 +79,21 @@ class FileContent:
     periodicity: str = ""
     notes: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
+    lattice: NDArray | None = None
 
-    def packing(self, path: AnyPath, options: ReadOptions, box: Box | None) -> Packing:
-        """The packing in m, in the box given or else in that of the file."""
+    def packing(self, path: AnyPath, options: ReadOptions, box: Box | Cell | None) -> Packing:
+        """The packing in m, in the box or the periodic cell given or else in that of the file."""
         scale, notes = self._scale(path, options)
         radii = self._radii(path, options, scale)
         place = "given" if box is not None else self.box_place if self.corners is not None else ""
         with np.errstate(over="ignore"):  # what is not finite is refused below
             if box is None and self.corners is not None:
-                box = make_box(path, *(np.asarray(corner) * scale for corner in self.corners))
+                box = self._box(path, scale)
             centres = self.centres * scale if scale != 1.0 else self.centres
+        if options.periodic == "cell":
+            if box is None:
+                raise InputError(f"{path}: the file has no box. Give the periodic cell, as in box=Cell(vectors).")
+            box = box if isinstance(box, Cell) else Cell.of(box)
         if options.radius is not None:
             notes = (*notes, f"radius of all spheres {options.radius:.9g} m, given")
         reading = Reading(
@@ -93,6 +101,15 @@ class FileContent:
             self.frames, self.periodicity, place, (*self.notes, *notes),
         )  # fmt: skip
         return Packing(centres, radii, box, Source(path, self.lines, reading), dict(self.metadata))
+
+    def _box(self, path: AnyPath, scale: float) -> Box | Cell:
+        assert self.corners is not None
+        if self.lattice is None:
+            return make_box(path, *(np.asarray(corner) * scale for corner in self.corners))
+        try:
+            return Cell(self.lattice * scale, np.asarray(self.corners[0]) * scale)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
 
     def _scale(self, path: AnyPath, options: ReadOptions) -> tuple[float, tuple[str, ...]]:
         """Length of the file's unit in m, and what is to be noted about it."""
@@ -140,8 +157,16 @@ def missing_radius(place: str | AnyPath, found: str = "") -> NoReturn:
     )
 
 
+def tilted(place: str) -> InputError:
+    """The error of a box that is not aligned with the axes, and not read into a periodic cell."""
+    return InputError(
+        f"{place}: the box is tilted; only axis-aligned boxes are read. In Python, "
+        'Packing.read(path, periodic="cell") reads a tilted periodic cell.'
+    )
+
+
 def periodicity(place: str, axes: str, stated: str, options: ReadOptions) -> str:
-    """What is said of periodic boundaries that the user ignores; InputError if the user does not.
+    """What is said of periodic boundaries; InputError if the user has not said how to read them.
 
     Parameters
     ----------
@@ -158,9 +183,17 @@ def periodicity(place: str, axes: str, stated: str, options: ReadOptions) -> str
     along = ", ".join(axes)
     if options.periodic is None:
         raise InputError(
-            f"{place}: the packing is periodic along {along} ({stated}), and porefv has no periodic cells. Give "
-            'periodic = "ignore" to read it into a box with six walls: flow near these walls is not that of the bulk.'
+            f"{place}: the packing is periodic along {along} ({stated}). Give "
+            'periodic = "ignore" to read it into a box with six walls: flow near these walls is not that of the bulk. '
+            'In Python, Packing.read(path, periodic="cell") reads it into a periodic cell, for PeriodicFlow.'
         )
+    if options.periodic == "cell":
+        if axes != "xyz":
+            raise InputError(
+                f"{place}: the packing is periodic along {along} alone ({stated}), and porefv has periodic cells "
+                'without walls only. Give periodic = "ignore" to read it into a box with six walls.'
+            )
+        return f"periodic along {along} ({stated}), read into a periodic cell"
     return (
         f"periodic along {along} ({stated}), which is ignored: the box has walls, and flow near them is not the bulk's"
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from porefv.errors import InputError
 from porefv.packing.files.column_names import Column, chosen_columns, positions, recognised, spheres
-from porefv.packing.files.content import FileContent, LengthUnit, periodicity
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity, tilted
 from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
 from porefv.packing.files.length_units import agreed_unit, metres, stated_unit
 from porefv.packing.files.options import ReadOptions
@@ -69,6 +69,8 @@ def _title_unit(path: AnyPath, title: str) -> LengthUnit | None:
 def _crossed(path: AnyPath, line: int, flags: NDArray, options: ReadOptions) -> str:
     """What is said of image flags other than 0: an atom has one once it has crossed a periodic boundary."""
     axes = "".join(axis for axis, flag in zip("xyz", flags.T, strict=False) if flag.any())
+    if axes and options.periodic == "cell":
+        return f"periodic by image flags along {', '.join(axes)} that are not 0, read into a periodic cell"
     return periodicity(f"{path}, line {line}", axes, "image flags that are not 0", options)
 
 
@@ -89,7 +91,7 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
             f"{path}, line {start + 1}: no atom_style stands after Atoms, and with Masses it is not sphere, in which "
             "each atom has a density. If it is, write 'Atoms # sphere'."
         )
-    number, corners = _data_header(path, texts[1:start])
+    number, corners, lattice = _data_header(path, texts[1:start], options)
     rows = Rows(path, texts[start + 1 :], first=start + 2)
     end = next((k for k, text in enumerate(rows.texts) if text[0].isalpha()), len(rows.texts))
     _check_number(path, number, end, rows.numbers[end - 1] if end else start + 1)
@@ -117,27 +119,38 @@ def _read_data(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     return FileContent(
         "LAMMPS data file, atom_style sphere", values[:, 1:4], values[:, 4] / 2, corners, "xlo xhi, ylo yhi, zlo zhi",
         _title_unit(path, lines[0]), numbers[order],
-        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, periodicity=said, notes=notes,
+        {"x": "x", "y": "y", "z": "z", "radius": "diameter (halved)"}, periodicity=said, notes=notes, lattice=lattice,
     )  # fmt: skip
 
 
-def _data_header(path: AnyPath, texts: list[str]) -> tuple[int, Corners | None]:
-    """Number of atoms and corners of the box."""
+def _data_header(path: AnyPath, texts: list[str], options: ReadOptions) -> tuple[int, Corners | None, NDArray | None]:
+    """Number of atoms, corners of the box, and the vectors of a tilted periodic cell."""
     number, bounds = None, {}
+    tilts = [0.0, 0.0, 0.0]
     for line, text in enumerate(texts, 2):
         words = text.split()
         if words[1:] == ["atoms"] and _COUNT.fullmatch(words[0]):
             number = int(words[0])
         elif match := re.fullmatch(r"(\S+)\s+(\S+)\s+([xyz])lo\s+\3hi", text):
             bounds[match[3]] = _numbers(path, line, match[1], match[2])
-        elif words[3:] == ["xy", "xz", "yz"] and any(_numbers(path, line, *words[:3])):
-            raise _tilted(path, line)
+        elif words[3:] == ["xy", "xz", "yz"]:
+            tilts = _numbers(path, line, *words[:3])
+            if any(tilts) and options.periodic != "cell":
+                raise tilted(f"{path}, line {line}")
     if number is None:
         raise InputError(f"{path}: the header has no line like '100 atoms'.")
     if set(bounds) != set("xyz"):
-        return number, None
+        return number, None, None
     lower, upper = zip(*(bounds[axis] for axis in "xyz"), strict=True)
-    return number, (np.array(lower), np.array(upper))
+    corners = np.array(lower), np.array(upper)
+    return number, corners, _lattice(corners, tilts) if any(tilts) else None
+
+
+def _lattice(corners: Corners, tilts: list[float]) -> NDArray:
+    """(3, 3): lattice vectors of a tilted box with the tilts xy, xz, yz."""
+    x, y, z = corners[1] - corners[0]
+    xy, xz, yz = tilts
+    return np.array([[x, 0.0, 0.0], [xy, y, 0.0], [xz, yz, z]])
 
 
 # ---- dumps -------------------------------------------------------------------------------------------------
@@ -168,7 +181,7 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
     if frame.missing:
         which = "the last frame" if chosen == len(frames) - 1 else f"frame {chosen}"
         raise InputError(f"{path}: {which} lacks ITEM: {frame.missing}. Was the file cut off?")
-    corners, axes = _dump_box(path, lines, frame.items["BOX BOUNDS"])
+    corners, axes, lattice = _dump_box(path, lines, frame.items["BOX BOUNDS"], options)
     line = frame.items["BOX BOUNDS"] + 1
     said = periodicity(f"{path}, line {line}", axes, lines[line - 1].removeprefix("ITEM:").strip(), options)
     start = frame.items["ATOMS"]
@@ -195,13 +208,16 @@ def _read_dump(path: AnyPath, lines: list[str], options: ReadOptions) -> FileCon
         values, numbers = values[order, :-1], numbers[order]
     values, flags = np.split(values, [len(columns)], axis=1)
     said = said or _crossed(path, start + 1, flags, options)
+    if scaled and lattice is not None and len(scaled) < 3:
+        raise InputError(f"{path}, line {start + 1}: all of xs ys zs are needed in a tilted box, or none.")
     with np.errstate(over="ignore", invalid="ignore"):
-        for k, axis in scaled.items():
-            values[:, k] = corners[0][axis] + values[:, k] * (corners[1] - corners[0])[axis]
+        vectors = np.diag(corners[1] - corners[0]) if lattice is None else lattice
+        places, own = list(scaled), list(scaled.values())
+        values[:, places] = corners[0][own] + values[:, places] @ vectors[np.ix_(own, own)]
     centres, radii, unit, shown = spheres(f"{path}, line {start + 1}", columns, values, options)
     return FileContent(
         "LAMMPS dump", centres, radii, corners, "BOX BOUNDS", agreed_unit(unit, frame.unit, options), numbers, shown,
-        chosen, len(frames), said, notes,
+        chosen, len(frames), said, notes, lattice=lattice,
     )  # fmt: skip
 
 
@@ -248,26 +264,34 @@ def _declared(path: AnyPath, lines: list[str], frame: _Frame) -> int:
     return int(number)
 
 
-def _dump_box(path: AnyPath, lines: list[str], start: int) -> tuple[Corners, str]:
-    """Corners of the box, and the axes along which it is periodic."""
+def _dump_box(path: AnyPath, lines: list[str], start: int, options: ReadOptions) -> tuple[Corners, str, NDArray | None]:
+    """Corners of the box, the axes along which it is periodic, and the vectors of a tilted periodic cell."""
     words = lines[start].removeprefix("ITEM: BOX BOUNDS").split()
     if "abc" in words:
-        raise _tilted(path, start + 1)
-    tilted = "xy" in words
-    bounds = []
+        raise InputError(f"{path}, line {start + 1}: the box is tilted by three free vectors; only tilts are read.")
+    with_tilts = "xy" in words
+    bounds, tilts = [], []
     for position in range(start + 1, start + 4):
         cells = lines[position].split() if position < len(lines) else []
-        if len(cells) != 2 + tilted:
-            count = "three numbers, lower, upper and tilt" if tilted else "two numbers, lower and upper"
+        if len(cells) != 2 + with_tilts:
+            count = "three numbers, lower, upper and tilt" if with_tilts else "two numbers, lower and upper"
             raise InputError(f"{path}, line {position + 1}: {count}, are expected.")
         found = _numbers(path, position + 1, *cells)
-        if tilted and found[2] != 0:
-            raise _tilted(path, position + 1)
+        if with_tilts and found[2] != 0 and options.periodic != "cell":
+            raise tilted(f"{path}, line {position + 1}")
         bounds.append(found[:2])
+        tilts += found[2:]
     flags = [word for word in words if re.fullmatch("[pfsm]{2}", word)]
     axes = "".join(axis for axis, flag in zip("xyz", flags, strict=False) if "p" in flag)
     lower, upper = zip(*bounds, strict=True)
-    return (np.array(lower), np.array(upper)), axes
+    corners = np.array(lower), np.array(upper)
+    if not any(tilts):
+        return corners, axes, None
+    # LAMMPS gives the bounds of what the tilted box spans: they are further out than its own by what it leans over.
+    xy, xz, yz = tilts
+    corners[0][:2] -= min(0.0, xy, xz, xy + xz), min(0.0, yz)
+    corners[1][:2] -= max(0.0, xy, xz, xy + xz), max(0.0, yz)
+    return corners, axes, _lattice(corners, tilts)
 
 
 def _dump_columns(
@@ -296,10 +320,6 @@ def _dump_columns(
 
 
 # ---- both --------------------------------------------------------------------------------------------------
-
-
-def _tilted(path: AnyPath, line: int) -> InputError:
-    return InputError(f"{path}, line {line}: the box is tilted; only axis-aligned boxes are read.")
 
 
 def _numbers(path: AnyPath, line: int, *words: str) -> list[float]:

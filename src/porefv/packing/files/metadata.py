@@ -55,8 +55,8 @@ def metadata_comments(packing: Packing, path: AnyPath) -> list[str]:
         If a value of the metadata would be read as a unit other than m, or as a periodic boundary.
     """
     lines = []
-    if packing.box is not None:
-        for key, corner in (("box_lower", packing.box.lower), ("box_upper", packing.box.upper)):
+    if packing.walled_box is not None:
+        for key, corner in (("box_lower", packing.walled_box.lower), ("box_upper", packing.walled_box.upper)):
             lines.append(f"# {key} = " + " ".join(repr(value) for value in corner.tolist()))
     values = [f"{key} = {' '.join(value.split())}" for key, value in packing.metadata.items()]
     units = [(value, unit) for value in values if (unit := stated_unit(f"{path}", value)) is not None]

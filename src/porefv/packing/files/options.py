@@ -28,8 +28,9 @@ class ReadOptions:
         Factor by which lengths in the file are multiplied to be in m. Default: by the units that the file states.
     frame : int, optional
         Frame to read, counted from 0; -1 is the last. Default: the last.
-    periodic : {"ignore"}, optional
-        Read a periodic packing into a box with six walls. Default: refuse it.
+    periodic : {"cell", "ignore"}, optional
+        Read the packing into a periodic cell, or a periodic packing into a box with six walls. Default: refuse a
+        periodic packing.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -46,8 +47,8 @@ class ReadOptions:
                 raise InputError(f"{path}: {name} must be a positive number of m, not {value!r}.")
         if self.frame is not None and (isinstance(self.frame, bool) or not isinstance(self.frame, int | np.integer)):
             raise InputError(f"{path}: frame must be a whole number, 0 for the first and -1 for the last.")
-        if self.periodic not in (None, "ignore"):
-            raise InputError(f'{path}: periodic must be "ignore", or not be given; it is {self.periodic!r}.')
+        if self.periodic not in (None, "cell", "ignore"):
+            raise InputError(f'{path}: periodic must be "cell", "ignore", or not be given; it is {self.periodic!r}.')
         for role, name in self.columns.items():
             if role not in ROLES or not isinstance(name, str):
                 raise InputError(f"{path}: columns are names of {', '.join(ROLES)}, not {quoted(str(role))}: {name!r}.")

@@ -7,6 +7,7 @@ from os import PathLike
 
 from porefv.errors import InputError, PackingFileWarning, counted
 from porefv.packing.box import Box
+from porefv.packing.cell import Cell
 from porefv.packing.files import csv, esys, lammps, mercury, pvd, table, vtk, xyz, xyzd, yade
 from porefv.packing.files.content import FileContent
 from porefv.packing.files.detection import EXTENSIONS, detected, extension
@@ -34,7 +35,7 @@ FORMATS = tuple(_READERS)
 def read_packing(
     path: str | PathLike[str],
     format: str | None = None,
-    box: Box | None = None,
+    box: Box | Cell | None = None,
     *,
     columns: Mapping[str, str] | None = None,
     radius: float | None = None,
@@ -49,8 +50,8 @@ def read_packing(
     path : path
     format : {"csv", "yade", "lammps", "vtk", "pvd", "mercury", "esys", "xyz", "xyzd"}, optional
         Default: by the content of the file, and then by its extension (`EXTENSIONS`).
-    box : Box, optional
-        Box to use instead of the one in the file, m.
+    box : Box or Cell, optional
+        Box to use instead of the one in the file, m. A periodic `Cell` stands for `periodic="cell"`, too.
     columns : mapping of str to str, optional
         Name of the column of x, y, z, radius or diameter; without a header, its place counted from 1, such as "4".
         Default: by the usual names.
@@ -61,9 +62,10 @@ def read_packing(
         the file states, or 1.
     frame : int, optional
         Frame to read, counted from 0; -1 is the last. Default: the last.
-    periodic : {"ignore"}, optional
-        Read a periodic packing into a box with six walls; flow near these walls is not that of the bulk. Default:
-        refuse it.
+    periodic : {"cell", "ignore"}, optional
+        "cell": read the packing into a periodic cell, tilted or not, whether or not the file states that it is
+        periodic. "ignore": read a periodic packing into a box with six walls; flow near these walls is not that of the
+        bulk. Default: refuse a periodic packing.
 
     Returns
     -------
@@ -78,6 +80,8 @@ def read_packing(
     MissingExtraError
         If the format needs a package that is not installed.
     """
+    if isinstance(box, Cell) and periodic is None:
+        periodic = "cell"
     options = ReadOptions(columns or {}, radius, scale, frame, periodic).check(path)
     if format is not None and format not in _READERS:
         raise InputError(f"{path}: format '{format}' cannot be read. Give one of {', '.join(_READERS)}.")

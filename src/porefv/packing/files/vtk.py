@@ -72,8 +72,8 @@ def write(packing: Packing, path: AnyPath) -> None:
     """Write points with point data ``radius``, and the box as field data: .vtp, .vtu, or legacy .vtk (binary)."""
     points = load("pyvista", "Writing VTK files").PolyData(np.array(packing.centres))
     points.point_data["radius"] = np.array(packing.radii)
-    if packing.box is not None:
-        for name, corner in zip(_CORNERS, (packing.box.lower, packing.box.upper), strict=True):
+    if packing.walled_box is not None:
+        for name, corner in zip(_CORNERS, (packing.walled_box.lower, packing.walled_box.upper), strict=True):
             points.field_data[name] = np.array(corner)
     with atomic_write(path) as temporary:
         temporary.write_bytes(_serialised(points, Path(path).suffix.lower()))

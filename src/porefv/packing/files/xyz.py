@@ -10,10 +10,11 @@ from __future__ import annotations
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
 from porefv.errors import InputError
 from porefv.packing.files.column_names import chosen_columns, positions, spheres
-from porefv.packing.files.content import FileContent, LengthUnit, periodicity
+from porefv.packing.files.content import FileContent, LengthUnit, periodicity, tilted
 from porefv.packing.files.frames import chosen_frame, warn_cut_off, warn_no_end
 from porefv.packing.files.length_units import agreed_unit, first_clear, stated_unit
 from porefv.packing.files.options import ReadOptions
@@ -48,9 +49,11 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     unit = agreed_unit(unit, _unit(place, keys, others, options), options)
     if numbers[-1] == len(lines) and any(column.position == len(names) - 1 for column in columns):
         notes = (*notes, warn_no_end(f"{path}, line {len(lines)}"))
+    said = _periodicity(place, keys, others, options)
+    corners, lattice = _cell(place, keys, options)
     return FileContent(
-        "extended XYZ", centres, radii, _corners(place, keys), "Lattice", unit, numbers, shown, chosen, len(starts),
-        _periodicity(place, keys, others, options), notes,
+        "extended XYZ", centres, radii, corners, "Lattice", unit, numbers, shown, chosen, len(starts), said, notes,
+        lattice=lattice,
     )  # fmt: skip
 
 
@@ -126,15 +129,19 @@ def _names(place: str, keys: dict[str, str], row: str) -> list[str]:
     return names
 
 
-def _corners(place: str, keys: dict[str, str]) -> Corners | None:
+def _cell(place: str, keys: dict[str, str], options: ReadOptions) -> tuple[Corners | None, NDArray | None]:
+    """Corners of the box, and the vectors of a tilted periodic cell."""
     if "lattice" not in keys:
-        return None
+        return None, None
     try:
         lattice = np.array(keys["lattice"].split(), dtype=np.float64).reshape(3, 3)
         origin = np.array(keys.get("origin", "0 0 0").split(), dtype=np.float64).reshape(3)
     except ValueError:
         raise InputError(f"{place}: Lattice must be nine numbers, and Origin three.") from None
-    if np.count_nonzero(lattice - np.diag(np.diagonal(lattice))):
-        raise InputError(f"{place}: the box is tilted; only axis-aligned boxes are read.")
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
-        return origin, origin + np.diagonal(lattice)
+        corners = origin, origin + np.diagonal(lattice)
+    if not np.count_nonzero(lattice - np.diag(np.diagonal(lattice))):
+        return corners, None
+    if options.periodic != "cell":
+        raise tilted(place)
+    return corners, lattice

@@ -39,7 +39,9 @@ def read(path: AnyPath, content: bytes, options: ReadOptions) -> FileContent:
     with np.errstate(over="ignore"):  # what is not finite is refused later
         radii = values[:, 3] * (growth / 2)
     note = "packing-generation makes periodic packings: the box has walls, and flow near them is not the bulk's"
-    if options.periodic is None:
+    if options.periodic == "cell":
+        note = "packing-generation makes periodic packings: read into a periodic cell"
+    elif options.periodic is None:
         warnings.warn(f'{path}: {note}. Give periodic = "ignore" to accept this.', PackingFileWarning, stacklevel=2)
     return FileContent(
         "packing-generation .xyzd", values[:, :3], radii, corners, f"Dimensions in {nfo.name}",
