@@ -16,7 +16,7 @@ from porefv.dem.material import Material
 from porefv.dem.plate import Plate
 from porefv.dem.random_placement import cloud
 from porefv.dem.sizes import UniformSizes
-from porefv.errors import InputError
+from porefv.errors import ComputationError, InputError
 
 FILES = Path(__file__).parent / "files"
 LID = Walls.from_mapping({"z_max": {"pressure": 0.0, "free": True}, "lateral": {"slip": True}})
@@ -62,8 +62,11 @@ def test_grains_settle_as_in_short_steps(courses):
 def test_long_steps_are_taken(courses):
     _, coupling = courses[10]
     assert coupling.effort.steps == 1200
-    assert coupling.state.stride > 1
+    assert coupling.stride > 1
     assert courses[1][1].state.stride == 1
+    _, begun = sinking(stride=10)
+    begun.run(100)
+    assert begun.state.stride == 10
 
 
 def test_impulse_and_power_balance_in_each_long_step(courses):
@@ -125,6 +128,14 @@ def test_a_dry_run_goes_on_after_a_long_step():
     dem.run(7)
     assert (dem.steps, dem.last_step) == (steps + 7, dem.step)
     assert dem.time == pytest.approx(time + 7 * dem.step)
+
+
+def test_a_long_step_that_runs_away_names_the_stride():
+    dem = DEM(Packing([[0.15, 0.15, 0.2]], [RADIUS], Box([0, 0, 0], [0.3, 0.3, 0.4])), Material(YOUNG))
+    dem.velocities = [[0.0, 0.0, -0.02 * RADIUS / dem.step]]
+    dem.predict(10)
+    with pytest.raises(ComputationError, match="runs away .* 10 steps long: a smaller stride may do"):
+        dem.correct(np.zeros((1, 3)), np.zeros(6))
 
 
 def test_steps_are_not_long_where_a_wall_presses():

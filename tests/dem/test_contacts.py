@@ -174,6 +174,21 @@ def test_a_grain_rolls_down_a_slope_until_friction_cannot_turn_it(slope):
         assert_allclose(dem.spins[0, 1] * r, dem.velocities[0, 0], rtol=0.01)
 
 
+def test_a_grain_alone_falls_on_the_floor_and_bounces():
+    # It falls by nine radii first: contacts are looked for on the way, though there is no other grain.
+    r, height = 0.1, 1.0
+    hard = Material(young=1.0e8, stiffness_ratio=0.0, friction_angle=0.0, density=1000.0)
+    dem = DEM(Packing([[1, 1, height]], [r], Box([0, 0, 0], [2, 2, 2])), hard, gravity=(0.0, 0.0, -9.81))
+    fall = np.sqrt(2.0 * (height - r) / 9.81)
+    lowest = height
+    while dem.time < 1.5 * fall:
+        dem.run(1)
+        lowest = min(lowest, dem.positions[0, 2])
+    assert 0.9 * r < lowest < r
+    assert dem.velocities[0, 2] > 0.0
+    assert dem.positions[0, 2] > 0.5 * height
+
+
 def test_a_stack_under_gravity_bears_the_weight_above_each_contact():
     r, g, count = 0.1, 10.0, 5
     weight = mass(r) * g

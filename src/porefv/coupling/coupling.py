@@ -11,6 +11,7 @@ import numpy as np
 from porefv.conductance.conductances import throat_conductances
 from porefv.conductance.model import ConductanceModel, ensure_model
 from porefv.conductance.registry import AUTO
+from porefv.coupling.anderson_mixing import AndersonMixing
 from porefv.coupling.coupled_pressure import CoupledPressure
 from porefv.coupling.coupling_settings import CouplingSettings, Effort
 from porefv.coupling.coupling_state import CouplingState
@@ -46,8 +47,13 @@ _ANEW_EVERY = 50
 _OF_PAIRS = 0.1
 # The same in long steps, in which their splitting from pressures rules it.
 _OF_PAIRS_IN_LONG_STEPS = 0.3
-# Most rounds of pairs and pressures in the first step on a mesh, and the relative change at which they end.
-_ROUNDS, _SETTLED = 30, 1e-3
+# Most rounds of pairs and pressures in the first step on a mesh. They end where pressures change by the second part,
+# and the power of pairs is wrong by the third part of the fluid's.
+_ROUNDS, _SETTLED, _AGREED = 60, 1e-3, 2e-4
+# Bound on the relative error of pressures and velocities within these rounds.
+_IN_ROUNDS = 1e-5
+# Rounds that the next one is extrapolated from. With 8, a stiff drag takes half as many again.
+_KEPT = 20
 # Steps between two looks at how far grains have moved.
 _STRIDE = 10
 # (`cast`: to ask each step whether grains are of a protocol takes longer than the step of a few hundred.)
@@ -289,19 +295,29 @@ class Coupling:
 
         Pairs resist the velocities under the pressures before, and the pressures change these further: the incremental
         splitting of projection methods, stable at any step, whose error goes with the change of the pressures. In the
-        first step on a mesh there are none before: rounds of both then converge to the step without splitting.
+        first step on a mesh there are none before: rounds of both then converge to the step without splitting. Without
+        Anderson's extrapolation they would take as many rounds as the drag of a step is stiff.
         """
         first, still = self.state.fresh, moves.copy()
-        for _ in range(_ROUNDS if first and self._pairs is not None else 1):
+        mixing, anew = AndersonMixing(_KEPT), _ANEW
+        for left in range(_ROUNDS if first and self._pairs is not None else 1, 0, -1):
             before = self.state.pressure
             self._slow_pairs()
             if self._pairs is not None:
                 np.add(still, self._pairs.changes[:, :3], out=moves)
             with Timer(self.effort.seconds, "pressure"):
-                self._find_pressure(moves, wall_mobilities)
-            change = np.abs(self.state.pressure - before)
-            if not first or change.max(initial=0.0) <= _SETTLED * np.abs(before).max(initial=0.0):
+                self._find_pressure(moves, wall_mobilities, anew)
+            anew = _IN_ROUNDS
+            if left == 1 or self._agree(before):
                 break
+            self.state.start_anew(mixing.next(before, self.state.pressure))
+
+    def _agree(self, before: np.ndarray) -> bool:
+        """Whether pairs and pressures agree, after a round that began with these pressures (f,)."""
+        pressure = self.state.pressure
+        if np.abs(pressure - before).max(initial=0.0) > _SETTLED * np.abs(before).max(initial=0.0):
+            return False
+        return self._pairs is None or self._pairs.mismatch(self.equation.forces(pressure), self.state) <= _AGREED
 
     def _slow_pairs(self) -> None:
         """What pairs resist with, under the pressures there are."""
@@ -313,10 +329,11 @@ class Coupling:
                     # Half of what the last step changed: without, long steps ring; all of it is unstable.
                     pressure, part = pressure + 0.5 * state.rate, _OF_PAIRS_IN_LONG_STEPS
                 forces = self.equation.forces(pressure)
-                self.effort.pair_iterations += self._pairs.resist(forces, part * self.settings.tolerance, state)
+                tolerance = _IN_ROUNDS if state.fresh else part * self.settings.tolerance
+                self.effort.pair_iterations += self._pairs.resist(forces, tolerance, state)
 
-    def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray) -> None:
-        """Find the pressures of a step, and what the next one starts from."""
+    def _find_pressure(self, moves: np.ndarray, wall_mobilities: np.ndarray, anew: float = _ANEW) -> None:
+        """Find the pressures of a step, and what the next one starts from; on another mesh to a tolerance of `anew`."""
         state, equation, tolerance = self.state, self.equation, self.settings.tolerance
         # Half of what the last step changed: all of it would pass its noise on.
         guess, product = state.pressure + 0.5 * state.rate, None
@@ -324,7 +341,7 @@ class Coupling:
         if steady and state.products.size and self.effort.steps % (_ANEW_EVERY * state.stride) >= state.stride:
             product = state.products[0] + 0.5 * state.products[1]
         if state.fresh:
-            tolerance = min(tolerance, _ANEW)
+            tolerance = min(tolerance, anew)
         if not len(state.factor_mobilities):
             state.factor_mobilities = wall_mobilities.copy()
             equation.prepare(state.factor_mobilities)

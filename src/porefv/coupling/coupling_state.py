@@ -106,6 +106,11 @@ class CouplingState:
             np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 6)), 1, 1, 0,
         )  # fmt: skip
 
+    def start_anew(self, pressure: np.ndarray) -> None:
+        """Look for the pressures of this mesh once more, from these (f,) [Pa]."""
+        self.pressure, self.rate = pressure, np.zeros_like(pressure)
+        self.products, self.fresh = np.zeros((2, 0)), True
+
     @property
     def mesh_packing(self) -> Packing:
         """What the mesh was made from."""

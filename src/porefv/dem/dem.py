@@ -406,6 +406,7 @@ class DEM:
             f"over {_RUNAWAY} of the smallest radius in one step. A start with deep overlaps, a wall that is too fast "
             "or forces applied from outside that grow do this; so does a step near the critical one. Grains that are "
             "fast for their stiffness need a larger young, or a smaller step"
+            + (f". This step is {state.stride} steps long: a smaller stride may do" if state.stride > 1 else "")
         )
 
     def apply(self, forces: np.ndarray) -> None:

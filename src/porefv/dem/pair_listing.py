@@ -31,7 +31,8 @@ def list_pairs(state: GrainState, young: float) -> None:
         Of the material [Pa].
     """
     n, places = len(state), state.walls.places
-    x = np.ascontiguousarray(state.grains.motion[:, :3])
+    # A copy, for the listing keeps it: of a single grain these columns are contiguous, and would be a view.
+    x = state.grains.motion[:, :3].copy()
     r = np.ascontiguousarray(state.grains.motion[:, 3])
     skin = _SKIN * float(r.min())
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from porefv.conductance.model import ConductanceModel
 from porefv.coupling.coupling_settings import MOST_STRIDE, SCHEMES
@@ -97,6 +97,25 @@ class CouplingTable(ConductanceTable):
         "than 1 needs `pair_resistance`",
         1,
     )
+
+    @model_validator(mode="after")
+    def _options_agree(self) -> Self:
+        """Long steps have pairs that resist and an implicit step, and a roughness has pairs."""
+        if self.stride > 1 and not self.pair_resistance:
+            raise refused(
+                f"a stride of {self.stride} needs pair_resistance = true, which keeps contacts from bouncing in long "
+                "steps; set that, or drop stride",
+                "stride",
+            )
+        if self.stride > 1 and self.scheme == "semi-implicit":
+            raise refused(
+                f"a stride of {self.stride} needs an implicit step; set scheme to 'auto' or 'implicit-drag', or drop "
+                "stride",
+                "scheme",
+            )
+        if "roughness" in self.model_fields_set and not self.pair_resistance:
+            raise refused("is that of pairs that resist; set pair_resistance = true, or drop it", "roughness")
+        return self
 
     def make(self) -> CouplingOptions:
         parameters = {name: value for name, value in self if name not in ConductanceTable.model_fields}
