@@ -43,8 +43,8 @@ def write(folder: Path) -> None:
 
 _INTRODUCTION = (
     "These pages are for users who write Python and know the name that they look for. After reading an entry you know "
-    "the shapes, units and errors of the name, and have an example. Packages stand in the order in which data flow. The "
-    ":doc:`Python interface </docs/api>` shows how they work together.\n\n"
+    "the shapes, units and errors of the name, and have an example. Packages stand in the order in which data flow. "
+    "The :doc:`Python interface </docs/api>` shows how they work together.\n\n"
 )
 
 
