@@ -42,15 +42,18 @@ def write(folder: Path) -> None:
 
 
 _INTRODUCTION = (
-    "For readers who write Python and know what they look for: every public name with shapes, units, errors and an "
-    "example, by package, in the order in which data flow. The `Python interface </docs/api>` shows how they work "
-    "together.\n\n"
-).replace("`Python interface </docs/api>`", ":doc:`Python interface </docs/api>`")
+    "These pages are for users who write Python and know the name that they look for. After reading an entry you know "
+    "the shapes, units and errors of the name, and have an example. Packages stand in the order in which data flow. "
+    "The :doc:`Python interface </docs/api>` shows how they work together.\n\n"
+)
 
 
 def _page(package: str, names: tuple[str, ...]) -> str:
     module = importlib.import_module(package)
     parts = [f"{inspect.getdoc(module)}\n"]
+    parts.append(
+        f"This page is for users who call ``{package}``: it has the arguments and results of each public name.\n"
+    )
     for name in names or sorted(module.__all__, key=str.lower):
         part, _, name = name.rpartition(".")
         home = importlib.import_module(f"{package}.{part}") if part else module
@@ -74,7 +77,11 @@ def _commands() -> str:
     os.environ["COLUMNS"] = "80"
     parser = program._parser()
     (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    parts = ["For users of the command line: what ``porefv COMMAND --help`` prints.\n", _literal(parser.format_help())]
+    introduction = (
+        "This page is for users of the command line. After reading it you know each command with its options. It is "
+        "what ``porefv COMMAND --help`` prints.\n"
+    )
+    parts = [introduction, _literal(parser.format_help())]
     for name, command in commands.choices.items():
         title = f"porefv {name}"
         parts += [f"{title}\n{'-' * len(title)}\n", _literal(command.format_help())]

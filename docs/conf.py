@@ -25,6 +25,7 @@ extensions = [
     "numpydoc",
     "sphinx_copybutton",
     "sphinx_design",
+    "mathml",
 ]
 
 # Pages are Markdown that GitHub shows too: headings are the targets of links, formulas stand between dollar signs.
@@ -49,9 +50,11 @@ default_role = "py:obj"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "porefv"
 html_static_path = ["static"]
+html_css_files = ["formulas.css"]
 html_extra_path = ["site"]
 html_theme_options = {"source_directory": ""}
 copybutton_prompt_text = r"\$ |>>> "

@@ -32,8 +32,8 @@ EQUATION_LABELS = [
 ]
 EQUATIONS = set(EQUATION_LABELS)
 
-# What a scene needs at least; examples that show a table or two are laid over it.
-LEAST = {"packing": "packings/n25_s1.csv", "walls": {"y_min": {"pressure": 1.0}, "y_max": {"pressure": 0.0}}}
+# What a scene in data/scenes needs at least; examples that show a table or two are laid over it.
+LEAST = {"packing": "../packings/n25_s1.csv", "walls": {"y_min": {"pressure": 1.0}, "y_max": {"pressure": 0.0}}}
 
 
 def blocks(page, *languages):
@@ -111,7 +111,29 @@ def test_commands_print_what_the_page_says(page, working_directory, capsys):
 @pytest.mark.parametrize("page", pages_with("toml"))
 def test_scenes_are_valid(page):
     for _, text in blocks(page, "toml"):
-        FlowScene.from_mapping(LEAST | tomllib.loads(text), directory=ROOT / "data")
+        FlowScene.from_mapping(LEAST | tomllib.loads(text), directory=ROOT / "data" / "scenes")
+
+
+@pytest.mark.parametrize("name", ["quickstart.md", "formats.md"])
+def test_a_scene_that_a_page_shows_as_a_file_is_that_file(name):
+    text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    shown = re.findall(
+        r"This is\s\[`data/scenes/(\w+\.toml)`\].{,300}?```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    )
+    assert shown
+    for file, scene in shown:
+        assert tomllib.loads(scene) == tomllib.loads((ROOT / "data" / "scenes" / file).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.name)
+def test_the_first_paragraph_says_who_a_page_is_for(page):
+    paragraph = " ".join(page.read_text(encoding="utf-8").split("\n\n")[1].split())
+    if page.name == "index.md":  # the entrance, which leads to the others
+        assert "This site is for" in paragraph
+    else:
+        assert re.match(
+            r"(This page is|These pages are) for .* After (each section|reading (it|them|an entry)),? you", paragraph
+        )
 
 
 @pytest.mark.parametrize("page", WITH_LINKS, ids=lambda page: page.name)
