@@ -17,9 +17,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from porefv import Box, Fluid, Packing, PoreFlow, Walls
-from porefv.conductance.conductances import throat_conductances
 from porefv.coupling import Coupling
-from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
+from porefv.coupling.open_throats import open_throats
 from porefv.dem.dem import DEM
 from porefv.dem.growth import grow
 from porefv.dem.material import Material
@@ -183,9 +182,7 @@ def permeability_errors(reference):
     """Relative errors of the permeability with section friction, and with the conductances that go with pairs."""
     mesh, walls = reference.pore_mesh(), reference.walls
     flow = PoreFlow(mesh, walls, Fluid(reference.viscosity))
-    narrow, alike = wall_reach(mesh, walls.slip), np.ones(6, bool)
-    without = throat_conductances(mesh, flow.conductance, alike, reference.viscosity)
-    conductances = (narrow * flow.conductances + (1.0 - narrow) * without) * growth_of_open_throats(mesh)
+    with_pairs = open_throats(mesh, flow.conductance, walls.slip, reference.viscosity).conductances
     i, j = mesh.throats.pores.T
     held = flow.imposed_pressures
     most = np.nanmax(held)
@@ -196,7 +193,7 @@ def permeability_errors(reference):
         return flux[held[i] == most].sum() - flux[held[j] == most].sum()
 
     plain = flow.permeability / reference.permeability
-    return plain - 1.0, plain * through(conductances) / through(flow.conductances) - 1.0
+    return plain - 1.0, plain * through(with_pairs) / through(flow.conductances) - 1.0
 
 
 def print_permeability():
