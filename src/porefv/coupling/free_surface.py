@@ -19,9 +19,9 @@ def clear_layers(mesh: PoreMesh, free: np.ndarray) -> np.ndarray:
     """(n_pores,) int: wall with a free surface in whose clear layer each pore is, -1 in none.
 
     A pore is in the clear layer where all its Laguerre vertices are further towards the wall than the outermost grain
-    of their column, by a mean diameter. A column is 1.5 mean diameters wide to each side, or 1.5 times the mean distance
-    of the grains that are further out than the vertex, if that is more: between the grains of a dilute cloud there is
-    no clear fluid.
+    of their column, by a mean diameter. A column is 1.5 mean diameters wide to each side, or 1.5 times the mean
+    distance of the grains that are further out than the vertex, if that is more: between the grains of a dilute cloud
+    there is no clear fluid.
 
     Parameters
     ----------
