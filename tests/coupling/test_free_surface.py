@@ -9,6 +9,8 @@ from porefv.coupling.end_correction import reached_walls
 from porefv.coupling.free_surface import clear_layers
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
+from porefv.dem.random_placement import cloud
+from porefv.dem.sizes import UniformSizes
 from porefv.errors import InputError
 
 UP = np.array([False] * 5 + [True])
@@ -35,6 +37,43 @@ def test_the_clear_layer_is_all_fluid_above_the_grains(bed):
     assert set(np.unique(layers)) == {-1, 5}
     assert (layers[heights > top + diameter] == 5).all()
     assert (layers[heights < packing.centres[:, 2].mean()] == -1).all()
+
+
+@pytest.fixture
+def dilute():
+    """dilute(c, height): 60 grains at random in a cube, whose box is so many times as high."""
+
+    def make(c, height):
+        packing = cloud(60, UniformSizes(1.0), Box([0, 0, 0], [1, 1, 1]), 1.0 - c, 1)
+        return Packing(packing.centres, packing.radii, Box([0, 0, 0], [1, 1, height]))
+
+    return make
+
+
+@pytest.mark.parametrize("c", [0.01, 0.05, 0.1])
+def test_there_is_no_clear_fluid_between_the_grains_of_a_dilute_cloud(dilute, c):
+    packing = dilute(c, 1.6)
+    mesh = PoreMesh(packing)
+    heights = np.full(mesh.n_pores, np.inf)
+    np.minimum.at(heights, mesh.cell_pore, mesh.vertices[:, 2])
+    clear = clear_layers(mesh, UP) == 5
+    spacing = len(packing) ** (-1.0 / 3.0)
+    assert clear.any() and heights[clear].min() > packing.centres[:, 2].max() - spacing
+    assert clear[heights > packing.centres[:, 2].max() + 2.0 * packing.radii[0]].all()
+
+
+@pytest.mark.parametrize("c", [0.01, 0.05, 0.1])
+@pytest.mark.parametrize("height", [1.0, 1.6])
+def test_a_dilute_cloud_settles_under_a_free_surface_as_in_a_closed_box(dilute, c, height):
+    speeds = []
+    for lid in ({"slip": True}, {"pressure": 0.0, "free": True}):
+        packing = dilute(c, height)
+        dem = DEM(packing, Material(young=1e5, density=2600.0), gravity=(0.0, 0.0, -9.81))
+        walls = Walls.from_mapping({"z_max": lid, "lateral": {"slip": True}})
+        viscosity = 1e6 * packing.radii[0] ** 2  # terminal within the steps
+        Coupling(dem, walls, Fluid(viscosity), pair_resistance=True, end_correction=False).run(20)
+        speeds.append(-dem.velocities[:, 2].mean())
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.2)
 
 
 def test_no_wall_is_a_free_surface_by_itself(bed):

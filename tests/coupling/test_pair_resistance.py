@@ -11,12 +11,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from porefv import Box, Fluid, Packing, PoreMesh, Walls
+from porefv.conductance.section_friction.model import SectionFriction
 from porefv.coupling import Coupling, PairLaw, PairResistance, checkpoint
+from porefv.coupling.open_throats import open_throats
 from porefv.dem.dem import DEM
 from porefv.dem.material import Material
 from porefv.dem.random_placement import cloud
 from porefv.dem.sizes import UniformSizes
 from porefv.errors import InputError
+from porefv.resolved.reference import StokesReference
 
 SLIPPING = {"lateral": {"slip": True}}
 NO_WALLS = np.zeros(6, bool)
@@ -82,6 +85,30 @@ def test_forces_and_torques_of_pairs_add_up_to_nothing(random_packing, seed, n):
     assert_allclose(moments.sum(axis=0), 0.0, atol=1e-12 * scale)
 
 
+def test_far_walls_resist_motion_past_them_and_no_other():
+    packing = cloud(20, UniformSizes(0.5), Box([0, 0, 0], [1, 1, 1]), 0.95, 1)
+    mesh, dragging, n = PoreMesh(packing), np.array([False, False, True, True, True, False]), 20
+    far = open_throats(mesh, SectionFriction(), ~dragging, 1.0).far_walls
+    assert (far.coefficients > 0.0).all() and set(far.members[:, 1] - n) == {2, 3, 4}
+    resistance = PairResistance(mesh, NO_WALLS, PairLaw(1.0, 0.02, growth=0.0, contact=0.0, lubricated=1e-9), None, far)
+    moves = np.zeros((n + 6, 6))
+    moves[:, :3] = 1.0, 2.0, 3.0
+    scale = far.coefficients.sum()
+    assert np.abs(resistance.multiply(moves)).max() <= 1e-13 * scale
+    rng = np.random.default_rng(1)
+    for moves in rng.normal(size=(10, n + 6, 6)):
+        resisted = resistance.multiply(moves)
+        assert np.vdot(moves, resisted) > 0.0
+        assert_allclose(resisted.sum(axis=0), 0.0, atol=1e-12 * scale)
+        assert (resisted[:, 3:] == 0.0).all()
+
+
+def test_walls_of_symmetry_are_never_far_walls():
+    packing = cloud(20, UniformSizes(1.0), Box([0, 0, 0], [1, 1, 1]), 0.95, 1)
+    found = open_throats(PoreMesh(packing), SectionFriction(), np.ones(6, bool), 1.0)
+    assert not len(found.far_walls.members) and (found.wall_factors == 1.0).all()
+
+
 @pytest.mark.parametrize("roughness", [1e-3, 0.05])
 def test_lubrication_grows_no_more_below_the_roughness(roughness):
     def normal(gap):
@@ -118,6 +145,16 @@ def test_a_grain_between_no_slip_walls(settling, side):
     assert settling.alone(side, between, 50.0) == pytest.approx(settling.faxen(side), rel=0.2)
 
 
+@pytest.mark.parametrize("name", [
+    "sc8_c0.05_no_slip", "fines_n8_m15_d8_s32_no_slip", "fines_n8_m15_d8_s32_symmetry", "rnd_n12_r5_p0.85_s3_no_slip",
+])  # fmt: skip
+def test_flow_through_held_grains_is_that_without_pairs(settling, name):
+    # All cases: python benchmarks/settling.py permeability.
+    path = Path(__file__).resolve().parents[2] / "data" / "reference" / "stokes" / f"{name}.json"
+    before, after = settling.permeability_errors(StokesReference.read(path))
+    assert after == pytest.approx(before, abs=0.003)
+
+
 @pytest.mark.parametrize("gap", [0.005, 0.02, 0.1])
 def test_two_grains_approach_and_slide(settling, gap):
     assert settling.two(gap, 0) == pytest.approx(settling.jeffrey_onishi(gap, 0), rel=0.15)
@@ -137,12 +174,12 @@ def test_a_cloud_settles_as_richardson_and_zaki_say(settling, c, seed):
 # ---- steps -----------------------------------------------------------------------------------------------------
 
 
-def sinking(n=60, viscosity=100.0, **options):
+def sinking(n=60, viscosity=100.0, lateral=SLIPPING["lateral"], **options):
     """A cloud under its submerged weight, under a lid at pressure 0."""
     packing = cloud(n, UniformSizes(1.0), Box([0, 0, 0], [0.25, 0.25, 0.45]), 0.75, 3)
     dem = DEM(packing, Material(density=2600.0), gravity=(0.0, 0.0, -9.81))
     dem.apply(1000.0 * 9.81 * 4.0 / 3.0 * np.pi * packing.radii[:, None] ** 3 * [0.0, 0.0, 1.0])
-    walls = Walls.from_mapping({"z_max": {"pressure": 0.0}, **SLIPPING})
+    walls = Walls.from_mapping({"z_max": {"pressure": 0.0}, "lateral": lateral})
     return dem, Coupling(dem, walls, Fluid(viscosity=viscosity), pair_resistance=True, **options)
 
 
@@ -158,8 +195,9 @@ def test_momentum_balances_with_pairs_to_rounding(viscosity):
         assert_allclose(rate, weight - on_walls, atol=1e-11 * np.abs(weight).max())
 
 
-def test_the_power_of_pairs_closes_the_balance():
-    dem, coupling = sinking(tolerance=1e-4)
+@pytest.mark.parametrize("slip", [True, False])
+def test_the_power_of_pairs_closes_the_balance(slip):
+    dem, coupling = sinking(tolerance=1e-4, lateral={"slip": slip})
     coupling.run(200)
     power = coupling.power
     weight = ((dem.masses[:, None] * dem.gravity + dem.applied) * dem.velocities).sum()

@@ -19,9 +19,9 @@ from porefv.coupling.end_correction import end_corrected_conductances
 from porefv.coupling.exchange import Exchange
 from porefv.coupling.free_surface import clear_layers
 from porefv.coupling.long_steps import adapt
-from porefv.coupling.open_throats import growth_of_open_throats, wall_reach
+from porefv.coupling.open_throats import NO_FAR_WALLS, open_throats
 from porefv.coupling.pair_motion import PairMotion
-from porefv.coupling.pair_resistance import PairResistance
+from porefv.coupling.pair_resistance import PairLaw, PairResistance
 from porefv.coupling.power import Power
 from porefv.coupling.relative_motion import RelativeMotion
 from porefv.coupling.validity import Validity, validity
@@ -398,14 +398,11 @@ class Coupling:
         with Timer(self.effort.seconds, "mesh"):
             grains, slip, pressures = self.grains, self.walls.slip, self.walls.pressures
             mesh = PoreMesh(packing)
-            conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
-            reach, self.end_depths = None, np.zeros(6)
+            factors, far_walls, self.end_depths = None, NO_FAR_WALLS, np.zeros(6)
             if self.settings.pair_resistance:
-                narrow = wall_reach(mesh, slip)
-                without = throat_conductances(mesh, self.conductance, np.ones(6, bool), self.fluid.viscosity)
-                conductances = narrow * conductances + (1.0 - narrow) * without
-                conductances *= growth_of_open_throats(mesh)
-                reach = narrow
+                conductances, factors, far_walls = open_throats(mesh, self.conductance, slip, self.fluid.viscosity)
+            else:
+                conductances = throat_conductances(mesh, self.conductance, slip, self.fluid.viscosity)
             if self.settings.end_correction:
                 conductances, self.end_depths = end_corrected_conductances(
                     mesh, conductances, pressures, self.walls.free
@@ -415,7 +412,7 @@ class Coupling:
             weights = solid_pressure_weights(mesh, self.conductance, conductances, slip, held)
             exchange = Exchange.of(
                 mesh, self.settings.exchange, slip, grains.rows,
-                split=self.conductance.force_split, solid_pressure=weights, wall_reach=reach,
+                split=self.conductance.force_split, solid_pressure=weights, wall_factors=factors,
             )  # fmt: skip
             drag = np.empty(len(packing))
             drag[grains.rows] = self.settings.stride * grains.step / grains.masses
@@ -431,7 +428,8 @@ class Coupling:
             self._pairs = None
             if self.settings.pair_resistance:
                 dragging = ~slip & np.isnan(pressures)
-                self._pairs = PairMotion(mesh, dragging, self.fluid.viscosity, self.settings.roughness, grains.rows)
+                law = PairLaw(self.fluid.viscosity, self.settings.roughness)
+                self._pairs = PairMotion(PairResistance(mesh, dragging, law, grains.rows, far_walls))
                 self._pairs.look(grains, self.state)
                 self.state.pair_velocities = np.zeros((len(packing) + 6, 6))
         self.effort.meshes += 1

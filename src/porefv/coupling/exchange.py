@@ -62,7 +62,7 @@ class Exchange(NamedTuple):
         *,
         split: ForceSplit = "surface",
         solid_pressure: SolidPressureWeights | None = None,
-        wall_reach: np.ndarray | None = None,
+        wall_factors: np.ndarray | None = None,
     ) -> Exchange:
         """The operator of a mesh.
 
@@ -78,12 +78,12 @@ class Exchange(NamedTuple):
             How the vertices of a throat divide its drag, with the kind 'facets' (see `porefv.flow.grain_forces`).
         solid_pressure : SolidPressureWeights, optional
             How the pressures of other pores act on the grains of a pore, with the kind 'facets'.
-        wall_reach : (t,) array, optional
-            Part of the share of no-slip walls in the drag of each throat that they take, with the kind 'facets'; the
-            rest goes to the throat's grains (`porefv.coupling.open_throats`). All of it by default [-].
+        wall_factors : (t,) array, optional
+            Of the share of no-slip walls in the drag of each throat, with the kind 'facets'; the throat's grains take
+            the rest (`porefv.coupling.open_throats`). 1 by default [-].
         """
         n = mesh.n_spheres
-        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, split, wall_reach)
+        gradients = mesh.volume_gradients if kind == "volumes" else _facet_gradients(mesh, slip, split, wall_factors)
         number = np.arange(n + 6, dtype=np.uint32)
         if grain_rows is not None:
             number[:n] = grain_rows
@@ -135,12 +135,14 @@ class Exchange(NamedTuple):
         spread(self, pressure, out)
 
 
-def _facet_gradients(mesh: PoreMesh, slip: np.ndarray, split: ForceSplit, wall_reach: np.ndarray | None) -> np.ndarray:
+def _facet_gradients(
+    mesh: PoreMesh, slip: np.ndarray, split: ForceSplit, wall_factors: np.ndarray | None
+) -> np.ndarray:
     gradients = np.zeros((mesh.n_cells, 4, 3))
     forces = facet_forces(mesh, slip, split)
-    if wall_reach is not None and (wall_reach < 1.0).any() and not slip.all():
+    if wall_factors is not None and (wall_factors != 1.0).any() and not slip.all():
         throat = mesh.throats.facet_throat
-        taken = np.where(throat >= 0, wall_reach[throat], 1.0)[:, None, None]
+        taken = np.where(throat >= 0, wall_factors[throat], 1.0)[:, None, None]
         forces = taken * forces + (1.0 - taken) * facet_forces(mesh, np.ones(6, bool), split)
     _gather_facets(mesh.cells, mesh.facets.cells, mesh.facets.vertices, forces, gradients)
     faces = mesh.wall_faces

@@ -7,9 +7,8 @@ from typing import cast
 import numpy as np
 
 from porefv.coupling.coupling_state import CouplingState
-from porefv.coupling.pair_resistance import PairLaw, PairResistance, Pairs
+from porefv.coupling.pair_resistance import PairResistance, Pairs
 from porefv.dem.grain_model import GrainModel, LongStepGrainModel, SpinningGrainModel
-from porefv.mesh.pore_mesh import PoreMesh
 from porefv.packing.box import WALL_AXES
 
 # The rows of the walls in arrays of grains and walls.
@@ -21,28 +20,19 @@ class PairMotion:
 
     Parameters
     ----------
-    mesh : PoreMesh
-    dragging : (6,) bool array
-        Walls that drag the fluid.
-    viscosity : float
-        [Pa s]
-    roughness : float
-        Gap below which lubrication grows no more, over the mean radius of a pair [-].
-    rows : (n,) int array
-        Row of each grain in the other arrays.
+    resistance : PairResistance
 
     Attributes
     ----------
-    resistance : PairResistance
     forces : (n + 6, 6) array
         Forces and torques of the pairs on grains and walls, by row, over the last step [N, N m].
     yielded : (n + 6, 6) array
         The same of contacts that have yielded in it; zero in a step that is not a long one.
     """
 
-    def __init__(self, mesh: PoreMesh, dragging: np.ndarray, viscosity: float, roughness: float, rows: np.ndarray):
-        self.resistance = PairResistance(mesh, dragging, PairLaw(viscosity, roughness), rows)
-        self._free, self._mobilities, self.forces, self.yielded = np.zeros((4, mesh.n_spheres + 6, 6))
+    def __init__(self, resistance: PairResistance):
+        self.resistance = resistance
+        self._free, self._mobilities, self.forces, self.yielded = np.zeros((4, resistance.n_rows, 6))
         self._contacts: Pairs | None = None
 
     def look(self, grains: GrainModel, state: CouplingState) -> None:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from porefv.coupling.open_throats import NO_FAR_WALLS, FarWalls
 from porefv.coupling.pair_resistance_kernels import (
     add_blocks,
     add_resistance,
@@ -108,18 +109,29 @@ class PairResistance:
     law : PairLaw
     grain_rows : (n,) int array, optional
         Row of each grain in arrays of velocities and forces, its id by default.
+    far_walls : FarWalls, optional
+        Resistances of walls on the other side of open throats, which stay those of the mesh.
 
     Attributes
     ----------
     pairs : Pairs
-        Coefficients are those of the last `set_positions`; at first of the mesh.
+        Coefficients are those of the last `set_positions`; at first of the mesh. Those of far walls come last.
+    n_rows : int
+        Number of grains and walls.
 
     Notes
     -----
     Theory, grains and fluid: :eq:`eq-pair-motion` and :eq:`eq-pair-force`.
     """
 
-    def __init__(self, mesh: PoreMesh, dragging: np.ndarray, law: PairLaw, grain_rows: np.ndarray | None = None):
+    def __init__(
+        self,
+        mesh: PoreMesh,
+        dragging: np.ndarray,
+        law: PairLaw,
+        grain_rows: np.ndarray | None = None,
+        far_walls: FarWalls = NO_FAR_WALLS,
+    ):
         n = mesh.n_spheres
         self.law, self._rows = law, np.arange(n) if grain_rows is None else grain_rows
         number = np.append(self._rows, n + np.arange(6))
@@ -127,8 +139,12 @@ class PairResistance:
         ends = ends[(ends < n).any(axis=1) & np.append(np.ones(n, bool), dragging)[ends].all(axis=1)]
         codes = np.unique(np.sort(number[ends], axis=1) @ np.array([n + 6, 1]))
         members = np.stack(np.divmod(codes, n + 6), axis=1).astype(np.uint32)
-        count = len(members)
-        self.pairs = Pairs(members, np.empty((count, 3)), np.empty((count, 2)), *np.empty((3, count)))
+        near, count = len(members), len(members) + len(far_walls.members)
+        members = np.concatenate([members, number[far_walls.members].astype(np.uint32)])
+        self.pairs = Pairs(members, np.zeros((count, 3)), np.zeros((count, 2)), *np.zeros((3, count)))
+        self.pairs.normals[near:], self.pairs.normal[near:] = far_walls.normals, far_walls.coefficients
+        self._near = Pairs(*(values[:near] for values in self.pairs))
+        self.n_rows = n + 6
         self._blocks, self._room = np.zeros((n + 6, 2, 6)), np.empty((4, n + 6, 6))
         self.set_positions(mesh.packing.centres, mesh.packing.radii, mesh.box.wall_places)
 
@@ -136,7 +152,7 @@ class PairResistance:
         """Work out the coefficients for grains, by id, and walls that have moved; pairs stay those of the mesh."""
         motion = np.empty((len(centres), 4))
         motion[self._rows, :3], motion[self._rows, 3] = centres, radii
-        find_coefficients(self.law, self.pairs.members, motion, places, self.pairs)
+        find_coefficients(self.law, self._near.members, motion, places, self._near)
         self._blocks[:] = 0.0
         add_blocks(self.pairs, self._blocks)
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
