@@ -82,7 +82,7 @@ BASES = {
     "simulation": {
         "packing": {"file": "../packings/n25_s1.csv"},
         "fluid": {},
-        "coupling": {"conductance": "hydraulic-radius"},
+        "coupling": {"conductance": "hydraulic-radius", "pair_resistance": True},
         "stages": [{"fluid": False, "rest": {}, "plates": {"z_max": {"stress": 1.0, "top_speed": 1.0}}}],
     },
 }
@@ -166,7 +166,8 @@ def test_defaults_are_those_of_the_functions():
     assert (flow.flow.solver, flow.flow.tolerance, flow.flow.gravity) == tuple(
         found[name] for name in ("solver", "tolerance", "gravity")
     )
-    coupling = KINDS["simulation"].from_mapping(BASES["simulation"], DATA / "scenes").coupling
+    plain = BASES["simulation"] | {"coupling": {"conductance": "hydraulic-radius"}}
+    coupling = KINDS["simulation"].from_mapping(plain, DATA / "scenes").coupling
     found = defaults(Coupling)
     assert len(coupling.parameters) == 8
     assert coupling.parameters == {name: found[name] for name in coupling.parameters}
