@@ -3,6 +3,7 @@
 python benchmarks/settling.py                 the tables
 python benchmarks/settling.py --seeds 2       quicker
 python benchmarks/settling.py collapse        settlement in time at several viscosities
+python benchmarks/settling.py surface       mean speed of dilute clouds under a free surface and in a closed box
 python benchmarks/settling.py permeability    errors on grains that are held, with the conductances that go with pairs
 
 Up to a solid fraction of 0.25 grains are placed at random. Denser clouds are grown, and then mixed by Monte Carlo moves
@@ -178,6 +179,33 @@ def print_collapse():
         print(f"| {viscosity:.0f} | {numbers} | {100 * np.abs(found / basis - 1.0).max():.1f} % |", flush=True)
 
 
+def surface_speed(c, seed, height, lid, n=150):
+    """Mean speed over that of a grain alone of a cloud in the lower cube of a box that is so many times as high.
+
+    `lid` is the upper wall; the others slip.
+    """
+    placed = cloud(n, UniformSizes(1.0), BOX, 1.0 - c, seed)
+    packing = Packing(placed.centres, placed.radii, Box([0, 0, 0], [1, 1, height]))
+    dem = DEM(packing, Material(young=1e5, density=2600.0), gravity=(0.0, 0.0, -9.81))
+    viscosity = 1e6 * packing.radii[0] ** 2  # the grains have their speeds within the steps
+    Coupling(
+        dem, Walls.from_mapping({"z_max": lid, **SLIP}), Fluid(viscosity), pair_resistance=True, end_correction=False
+    ).run(20)
+    return -dem.velocities[:, 2].mean() * viscosity / (2.0 / 9.0 * 2600.0 * 9.81 * packing.radii[0] ** 2)
+
+
+def print_surface(seeds):
+    """Clouds that fill a cube, and with clear fluid above them."""
+    print("| solid fraction | height | closed box | free surface |\n|---|---|---|---|")
+    for c in (0.01, 0.02, 0.05, 0.10, 0.20):
+        for height in (1.0, 1.6):
+            closed, free = (
+                np.mean([surface_speed(c, seed, height, lid) for seed in range(1, seeds + 1)])
+                for lid in ({"slip": True}, {"pressure": 0.0, "free": True})
+            )
+            print(f"| {c:.2f} | {height:.1f} | {closed:.2f} | {free:.2f} |", flush=True)
+
+
 def permeability_errors(reference):
     """Relative errors of the permeability with section friction, and with the conductances that go with pairs."""
     mesh, walls = reference.pore_mesh(), reference.walls
@@ -216,11 +244,14 @@ def print_permeability():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="?", choices=["tables", "collapse", "permeability"], default="tables")
+    parser.add_argument("what", nargs="?", choices=["tables", "collapse", "surface", "permeability"], default="tables")
     parser.add_argument("--seeds", type=int, default=5)
     options = parser.parse_args()
     if options.what == "collapse":
         print_collapse()
+        return
+    if options.what == "surface":
+        print_surface(options.seeds)
         return
     if options.what == "permeability":
         print_permeability()

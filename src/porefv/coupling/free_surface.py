@@ -28,6 +28,10 @@ def clear_layers(mesh: PoreMesh, free: np.ndarray) -> np.ndarray:
     mesh : PoreMesh
     free : (6,) bool array
         Walls that are free surfaces.
+
+    Notes
+    -----
+    Theory, grains and fluid: :eq:`eq-free-surface`.
     """
     layers = np.full(mesh.n_pores, -1)
     diameter = 2.0 * float(mesh.packing.radii.mean())
