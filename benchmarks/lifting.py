@@ -93,8 +93,9 @@ def lift(seed: int, rate: float, store: Path, until: float, **options) -> dict[s
 
 
 def when(course: dict[str, np.ndarray], happened: np.ndarray) -> float:
-    """Bottom pressure over W/A from which on something holds without a break."""
-    return float(course["pressure"][np.flatnonzero(~happened)[-1] + 1])
+    """Bottom pressure over W/A from which on something holds without a break; NaN where it does not at the end."""
+    first = np.flatnonzero(~happened)[-1] + 1
+    return float(course["pressure"][first]) if first < len(happened) else float("nan")
 
 
 def main() -> None:
