@@ -16,7 +16,6 @@ from porefv.packing.box import Box
 from porefv.packing.cell import Cell
 from porefv.packing.memory_estimate import ensure_room_for_spheres
 from porefv.packing.packing import Packing
-from porefv.system.html_table import html_table
 from porefv.system.lazy import lazy_property
 from porefv.tessellation.torus import TorusTriangulation
 from porefv.tessellation.vertices import Vertices
@@ -61,6 +60,8 @@ class PeriodicMesh(PoreMesh):
     """
 
     periodic = True
+
+    _title = "Periodic pore mesh"
 
     def __init__(self, packing: Packing, *, unite_tolerance: float = 0.01):
         if not 0.0 <= unite_tolerance < 1.0:
@@ -207,15 +208,9 @@ class PeriodicMesh(PoreMesh):
         """Not there for periodic meshes: an InputError."""
         raise InputError(NO_WALLS)
 
-    def _repr_html_(self) -> str:
-        rows = [
-            ("spheres", str(self.n_spheres)),
-            ("pores", f"{self.n_pores}, of {self.n_cells} cells"),
-            ("throats", f"{len(self.throats)}, {np.count_nonzero(self.throats.closed)} of them closed"),
-            ("void volume", f"{self.pore_volumes.sum():.4g} m³"),
-            ("periodic cell", self.periodic_cell.sides),
-        ]
-        return html_table("Periodic pore mesh", rows)
+    @property
+    def _enclosure(self) -> tuple[str, str]:
+        return "periodic cell", self.periodic_cell.sides
 
     def __repr__(self) -> str:
         return (

@@ -61,6 +61,8 @@ class PoreMesh(CellMesh):
         If the packing is not fit for use (see `Packing.validate`), or has no box.
     """
 
+    _title = "Pore mesh"
+
     def __init__(
         self,
         packing: Packing,
@@ -178,15 +180,20 @@ class PoreMesh(CellMesh):
 
         return mesh_to_openpnm(self)
 
+    @property
+    def _enclosure(self) -> tuple[str, str]:
+        """What encloses the fluid, and its sides."""
+        return "box", self.box.sides
+
     def _repr_html_(self) -> str:
         rows = [
             ("spheres", str(self.n_spheres)),
             ("pores", f"{self.n_pores}, of {self.n_cells} cells"),
             ("throats", f"{len(self.throats)}, {np.count_nonzero(self.throats.closed)} of them closed"),
             ("void volume", f"{self.pore_volumes.sum():.4g} m³"),
-            ("box", self.box.sides),
+            self._enclosure,
         ]
-        return html_table("Pore mesh", rows)
+        return html_table(self._title, rows)
 
     def __repr__(self) -> str:
         return (

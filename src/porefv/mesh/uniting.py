@@ -40,13 +40,7 @@ def unite(facets, laguerre_vertices, vertices, tolerance):
                 radius = min(radius, vertices.sizes[k])
         if square <= (tolerance * radius) ** 2:
             join(parent, i, j)
-    count = 0
-    for t in range(parent.shape[0]):  # a root comes before all below it
-        if parent[t] == t:
-            parent[t] = count
-            count += 1
-        else:
-            parent[t] = parent[parent[t]]
+    _label(parent)
     return parent
 
 
@@ -83,19 +77,25 @@ def join_with_steps(cells, neighbours, jumps, parent, steps):
         else:
             parent[i] = j
             steps[i, 0], steps[i, 1], steps[i, 2] = -u, -v, -w
-    count = 0
     for t in range(parent.shape[0]):
         root, x, y, z = _root(t, parent, steps)
         if root != t:
             parent[t] = root
             steps[t, 0], steps[t, 1], steps[t, 2] = x, y, z
+    _label(parent)
+    return -1
+
+
+@helper
+def _label(parent):
+    """Parents to labels, in the order of the roots."""
+    count = 0
     for t in range(parent.shape[0]):  # a root comes before all below it
         if parent[t] == t:
             parent[t] = count
             count += 1
         else:
             parent[t] = parent[parent[t]]
-    return -1
 
 
 @helper

@@ -13,14 +13,22 @@ import numpy as np
 from porefv.errors import ComputationError, InputError
 from porefv.flow.fluid import Fluid
 from porefv.flow.pore_flow import PoreFlow
-from porefv.flow.walls import Walls, ensure_no_imposed_flow
+from porefv.flow.walls import Walls
 from porefv.packing.box import WALL_NORMALS
 from porefv.resolved.lattice import Lattice, lattice_of
 from porefv.resolved.lattice_boltzmann import StokesLattice
 from porefv.resolved.lattice_links import NO_SLIP, OPEN, SYMMETRY
 from porefv.resolved.lattice_state import SavedState
 from porefv.resolved.lattice_values import LatticeOnMesh, at_points, read_off
-from porefv.resolved.reference import LatticeRun, StokesReference, Values, permeability_of, versions
+from porefv.resolved.reference import (
+    LatticeRun,
+    StokesReference,
+    Values,
+    distances,
+    ensure_driven,
+    permeability_of,
+    versions,
+)
 from porefv.system.memory import available
 from porefv.system.progress import Progress
 from porefv.system.threads import limited_threads
@@ -155,9 +163,7 @@ def lattice_reference(
     """
     options = options or LatticeOptions()
     progress = progress or Progress(STAGES, quiet=True)
-    ensure_no_imposed_flow(walls)
-    if np.isnan(walls.pressures).all():
-        raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
+    ensure_driven(walls)
     need, have = cost(mesh, options), available()
     progress.note(str(need))
     if have is not None and need.memory > have:
@@ -313,28 +319,17 @@ class _Refinement:
         def permeability(of: Values) -> float:
             return permeability_of(of, self.mesh, self.walls, self.viscosity)
 
-        def rms(difference: np.ndarray, scale: np.ndarray) -> float:
-            known = np.isfinite(difference) & np.isfinite(scale)
-            square = float(np.sum(scale[known] ** 2))
-            return float(np.sqrt(np.sum(difference[known] ** 2) / square)) if square > 0.0 else float("nan")
-
         coarser, finer = best[0], best[-1]
         errors = {
             "permeability": 0.5 * abs(permeability(finer) - permeability(coarser))
             + 0.5 * abs(permeability(finer) - permeability(finest))
         }
-        parts = (("forces", "sphere_total"), ("facet_flux", "facet_flux"), ("cell_pressure", "cell_pressure"))
-        for title, part in parts:
-            a, b, c = (getattr(of, part) for of in (coarser, finer, finest))
-            errors[title] = 0.5 * rms(b - a, b) + 0.5 * rms(b - c, b)
-        return errors
+        both, last = distances(finer, coarser, finer), distances(finer, finest, finer)
+        return errors | {name: 0.5 * both[name] + 0.5 * last[name] for name in both}
 
 
 def _extrapolated(coarse: Values, fine: Values, nodes: float, more: float) -> Values:
     """To a spacing of zero; where the coarser lattice has no node in a cell, the finer one's."""
-    factor = 1.0 / ((more / nodes) ** 2 - 1.0)
-    found = []
-    for part in fields(Values):
-        a, b = getattr(coarse, part.name), getattr(fine, part.name)
-        found.append(np.where(np.isnan(a), b, b + factor * (b - a)))
-    return Values(*found)
+    found = fine.extrapolated(coarse, 1.0 / ((more / nodes) ** 2 - 1.0))
+    pairs = ((getattr(found, part.name), getattr(fine, part.name)) for part in fields(Values))
+    return Values(*(np.where(np.isnan(value), finer, value) for value, finer in pairs))

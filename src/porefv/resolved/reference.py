@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from porefv.errors import InputError
-from porefv.flow.walls import Wall, Walls
+from porefv.flow.walls import Wall, Walls, ensure_no_imposed_flow
 from porefv.packing.box import WALL_NORMALS, WALLS, Box
 from porefv.packing.packing import Packing
 from porefv.resolved.facet_quadrature import cells_of, facet_points
@@ -404,6 +404,25 @@ def permeability_of(values: Values, mesh: PoreMesh, walls: Walls, viscosity: flo
     drop = walls.pressures[2 * axis] - walls.pressures[2 * axis + 1]
     flux = 0.5 * (values.wall_flux[2 * axis] - values.wall_flux[2 * axis + 1])
     return float(viscosity * flux * mesh.box.size[axis] / (drop * mesh.box.section(axis)))
+
+
+def ensure_driven(walls: Walls) -> None:
+    """InputError unless pressures of walls, one at least, drive the flow."""
+    ensure_no_imposed_flow(walls)
+    if np.isnan(walls.pressures).all():
+        raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
+
+
+def distances(first: Values, second: Values, scale: Values) -> dict[str, float]:
+    """Differences of two values, rms over those of a third: `forces`, `facet_flux` and `cell_pressure`."""
+    found = {}
+    parts = (("forces", "sphere_total"), ("facet_flux", "facet_flux"), ("cell_pressure", "cell_pressure"))
+    for name, part in parts:
+        difference, size = getattr(first, part) - getattr(second, part), getattr(scale, part)
+        known = np.isfinite(difference) & np.isfinite(size)
+        square = float(np.sum(size[known] ** 2))
+        found[name] = float(np.sqrt(np.sum(difference[known] ** 2) / square)) if square > 0.0 else float("nan")
+    return found
 
 
 def versions(*packages: str) -> dict[str, str]:

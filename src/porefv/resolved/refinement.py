@@ -10,10 +10,19 @@ from importlib.util import find_spec
 import numpy as np
 
 from porefv.errors import InputError, MissingExtraError
-from porefv.flow.walls import Walls, ensure_no_imposed_flow
+from porefv.flow.walls import Walls
 from porefv.mesh.pore_mesh import PoreMesh
 from porefv.resolved.fluid_geometry import REGULARISATIONS, contacts
-from porefv.resolved.reference import Run, StokesReference, Values, permeability_of, read_off, versions
+from porefv.resolved.reference import (
+    Run,
+    StokesReference,
+    Values,
+    distances,
+    ensure_driven,
+    permeability_of,
+    read_off,
+    versions,
+)
 from porefv.system.progress import Progress
 
 STAGES = ("meshing", "assembly", "solve", "reading off")
@@ -99,9 +108,7 @@ def stokes_reference(
     require_ngsolve()
     options = options or Options()
     progress = progress or Progress(STAGES, quiet=True)
-    ensure_no_imposed_flow(walls)
-    if np.isnan(walls.pressures).all():
-        raise InputError("no wall has a pressure: give at least one, for instance y_min = { pressure = 1.0 }")
+    ensure_driven(walls)
     levels = [(options.mesh_size, options.delta)]
     if not options.single:
         levels.insert(0, (1.5 * options.mesh_size, options.delta))
@@ -201,17 +208,10 @@ def _errors(levels: list[Values], values: Values, mesh: PoreMesh, walls: Walls, 
     def permeability(of: Values) -> float:
         return permeability_of(of, mesh, walls, viscosity)
 
-    def rms(difference: np.ndarray, scale: np.ndarray) -> float:
-        known = np.isfinite(difference) & np.isfinite(scale)
-        square = np.sum(scale[known] ** 2)
-        return float(np.sqrt(np.sum(difference[known] ** 2) / square)) if square > 0.0 else float("nan")
-
     coarse, fine, last = levels[0], levels[1], levels[-1]
     errors = {
         "permeability": abs(permeability(fine) - permeability(coarse))
         + 0.5 * abs(permeability(values) - permeability(last))
     }
-    for name, part in (("forces", "sphere_total"), ("facet_flux", "facet_flux"), ("cell_pressure", "cell_pressure")):
-        arrays = [getattr(of, part) for of in (coarse, fine, last, values)]
-        errors[name] = rms(arrays[1] - arrays[0], arrays[3]) + 0.5 * rms(arrays[3] - arrays[2], arrays[3])
-    return errors
+    meshes, extrapolation = distances(fine, coarse, values), distances(values, last, values)
+    return errors | {name: meshes[name] + 0.5 * extrapolation[name] for name in meshes}
