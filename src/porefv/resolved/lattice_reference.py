@@ -211,10 +211,9 @@ class _Refinement:
         self.saved = SavedState(state, mesh, walls, [viscosity, options.nodes, float(options.single)])
 
     def run(self) -> tuple[Values, dict[str, float], list[Any]]:
-        levels = self.options.levels
         done = self.saved.done
         before: tuple[Lattice, np.ndarray, np.ndarray] | None = None
-        for number, level in enumerate(levels):
+        for number, level in enumerate(self.options.levels):
             if number < len(done):
                 continue
             values, run, before = self._level(number, level, before)
@@ -225,7 +224,9 @@ class _Refinement:
         errors: dict[str, float] = {}
         if len(done) > 1:
             parts = [values for values, _ in done]
-            best = [_extrapolated(parts[k], parts[k + 1], levels[k], levels[k + 1]) for k in range(len(parts) - 1)]
+            # Nodes along the longest side: the spacing is rounded to a whole number of them.
+            sides = [max(run.shape) for _, run in done]
+            best = [_extrapolated(parts[k], parts[k + 1], sides[k], sides[k + 1]) for k in range(len(parts) - 1)]
             errors = self._errors(best, parts[-1])
             values = best[-1]
         return values, errors, [run for _, run in done]
@@ -328,7 +329,7 @@ class _Refinement:
         return errors | {name: 0.5 * both[name] + 0.5 * last[name] for name in both}
 
 
-def _extrapolated(coarse: Values, fine: Values, nodes: float, more: float) -> Values:
+def _extrapolated(coarse: Values, fine: Values, nodes: int, more: int) -> Values:
     """To a spacing of zero; where the coarser lattice has no node in a cell, the finer one's."""
     found = fine.extrapolated(coarse, 1.0 / ((more / nodes) ** 2 - 1.0))
     pairs = ((getattr(found, part.name), getattr(fine, part.name)) for part in fields(Values))
